@@ -1,0 +1,517 @@
+// Copyright (c) 2026, the view_servo authors
+// SPDX-License-Identifier: BSD-3-Clause
+
+/** @file
+ * Point matching against OpenCV's SIFT (500 key points) and AKAZE, in one run on the same images:
+ *
+ *     bench_points oxford|tilt|time [--runs N] [--set name=value ...]
+ *
+ * - oxford: the sequences in the folder oxford_affine of VIEW_SERVO_DATA, image 1 against 2 .. 6. Solved means a mean
+ *   error of the reference's four corners under 10 px; a match is correct within 4 px of the ground truth.
+ * - tilt: planes textured with pictures of Debian's opencv-doc and visp-images-data, tilted 0 .. 80 degrees. Solved
+ *   means a corner error under 5 px.
+ * - time: medians of a whole match, and of one against a stored reference, as ratios to SIFT's.
+ */
+#include "view_servo/views/matcher_parameters.h"
+#include "view_servo/views/view_matcher.h"
+
+#include <Eigen/Geometry>
+#include <Eigen/LU>
+#include <opencv2/calib3d.hpp>
+#include <opencv2/core.hpp>
+#include <opencv2/core/eigen.hpp>
+#include <opencv2/features2d.hpp>
+#include <opencv2/imgcodecs.hpp>
+#include <opencv2/imgproc.hpp>
+
+#include <sys/resource.h>
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <cstdio>
+#include <cstdlib>
+#include <filesystem>
+#include <fstream>
+#include <functional>
+#include <iostream>
+#include <limits>
+#include <optional>
+#include <string>
+#include <vector>
+
+namespace
+{
+using namespace view_servo;  // NOLINT(google-build-using-namespace): a program of its own
+
+constexpr double CORRECT = 4.0;  // [px]
+
+/** What a pipeline says of two images. */
+struct Answer
+{
+  std::optional<Eigen::Matrix3d> h;
+  Correspondences candidates;
+  Correspondences inliers;
+  double ms = 0.0;
+};
+
+/** Two images of a plane and the homography from the first to the second. */
+struct Problem
+{
+  std::string name;
+  cv::Mat reference;
+  cv::Mat current;
+  Eigen::Matrix3d truth;
+};
+
+double millisecondsSince(std::chrono::steady_clock::time_point start)
+{
+  return std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - start).count();
+}
+
+int correct(const Correspondences& pairs, const Eigen::Matrix3d& truth)
+{
+  return static_cast<int>(std::count_if(pairs.begin(), pairs.end(), [&](const Correspondence& pair) {
+    return ((truth * pair.reference.homogeneous()).hnormalized() - pair.current).norm() < CORRECT;
+  }));
+}
+
+/** Mean error of the reference's corners in the current image [px]; infinite without a homography. */
+double cornerError(const Answer& answer, const Problem& problem)
+{
+  if (!answer.h)
+  {
+    return std::numeric_limits<double>::infinity();
+  }
+  const double right = problem.reference.cols - 1.0;
+  const double bottom = problem.reference.rows - 1.0;
+  double sum = 0.0;
+  for (const Eigen::Vector2d& corner : Points{ { 0, 0 }, { right, 0 }, { right, bottom }, { 0, bottom } })
+  {
+    sum += ((*answer.h * corner.homogeneous()).hnormalized() -
+            (problem.truth * corner.homogeneous()).hnormalized())
+               .norm() /
+           4.0;
+  }
+  return sum;
+}
+
+Answer fromMatch(const ViewMatch& match)
+{
+  Answer answer;
+  for (const MatchedPoint& point : match.matches)
+  {
+    answer.candidates.push_back(point.position);
+    if (point.inlier)
+    {
+      answer.inliers.push_back(point.position);
+    }
+  }
+  if (match.outcome == MatchOutcome::MATCHED)
+  {
+    answer.h = match.matrix;
+  }
+  return answer;
+}
+
+Answer runOurs(const ViewMatcherParams& params, const Problem& problem)
+{
+  const auto start = std::chrono::steady_clock::now();
+  const PreparedImage reference(problem.reference, cv::Rect(), params.points);
+  const PreparedImage current(problem.current, cv::Rect(), params.points);
+  Answer answer = fromMatch(ViewMatcher(params).match(reference, current, GeometryModel::HOMOGRAPHY));
+  answer.ms = millisecondsSince(start);
+  return answer;
+}
+
+/** Key points, ratio test at 0.8, RANSAC at 3 px. */
+Answer runPeer(const cv::Ptr<cv::Feature2D>& detector, const cv::Ptr<cv::DescriptorMatcher>& matcher,
+               const Problem& problem)
+{
+  const auto start = std::chrono::steady_clock::now();
+  std::vector<cv::KeyPoint> reference_points;
+  std::vector<cv::KeyPoint> current_points;
+  cv::Mat reference_descriptors;
+  cv::Mat current_descriptors;
+  detector->detectAndCompute(problem.reference, cv::noArray(), reference_points, reference_descriptors);
+  detector->detectAndCompute(problem.current, cv::noArray(), current_points, current_descriptors);
+  Answer answer;
+  std::vector<cv::Point2f> from;
+  std::vector<cv::Point2f> to;
+  if (reference_points.size() >= 2 && current_points.size() >= 2)
+  {
+    std::vector<std::vector<cv::DMatch>> matches;
+    matcher->knnMatch(reference_descriptors, current_descriptors, matches, 2);
+    for (const std::vector<cv::DMatch>& best : matches)
+    {
+      if (best.size() == 2 && best[0].distance < 0.8F * best[1].distance)
+      {
+        from.push_back(reference_points[static_cast<std::size_t>(best[0].queryIdx)].pt);
+        to.push_back(current_points[static_cast<std::size_t>(best[0].trainIdx)].pt);
+      }
+    }
+  }
+  cv::Mat h;
+  std::vector<unsigned char> mask;
+  if (from.size() >= 4)
+  {
+    h = cv::findHomography(from, to, cv::RANSAC, 3.0, mask, 2000, 0.995);
+  }
+  if (!h.empty())
+  {
+    Eigen::Matrix3d matrix;
+    cv::cv2eigen(h, matrix);
+    answer.h = matrix;
+  }
+  answer.ms = millisecondsSince(start);
+  for (std::size_t i = 0; i < from.size(); ++i)
+  {
+    answer.candidates.push_back({ { from[i].x, from[i].y }, { to[i].x, to[i].y } });
+    if (answer.h && mask[i] != 0)
+    {
+      answer.inliers.push_back(answer.candidates.back());
+    }
+  }
+  return answer;
+}
+
+Answer runSift(const Problem& problem)
+{
+  return runPeer(cv::SIFT::create(500), cv::makePtr<cv::FlannBasedMatcher>(), problem);
+}
+
+Answer runAkaze(const Problem& problem)
+{
+  return runPeer(cv::AKAZE::create(), cv::makePtr<cv::BFMatcher>(cv::NORM_HAMMING), problem);
+}
+
+std::optional<Problem> loadProblem(const std::filesystem::path& sequence, int number)
+{
+  Problem problem;
+  problem.name = sequence.filename().string() + " 1-" + std::to_string(number);
+  for (const char* extension : { ".ppm", ".pgm", ".png" })
+  {
+    const std::filesystem::path reference = sequence / ("img1" + std::string(extension));
+    if (std::filesystem::exists(reference))
+    {
+      problem.reference = cv::imread(reference.string(), cv::IMREAD_GRAYSCALE);
+      problem.current =
+          cv::imread((sequence / ("img" + std::to_string(number) + extension)).string(), cv::IMREAD_GRAYSCALE);
+    }
+  }
+  std::ifstream file(sequence / ("H1to" + std::to_string(number) + "p"));
+  for (int i = 0; i < 9; ++i)
+  {
+    file >> problem.truth(i / 3, i % 3);
+  }
+  if (problem.reference.empty() || problem.current.empty() || !file)
+  {
+    return std::nullopt;
+  }
+  return problem;
+}
+
+int oxford(const ViewMatcherParams& params)
+{
+  const char* data = std::getenv("VIEW_SERVO_DATA");
+  if (data == nullptr)
+  {
+    std::cout << "oxford: skipped, VIEW_SERVO_DATA does not name a folder with oxford_affine\n";
+    return 0;
+  }
+  std::vector<std::filesystem::path> sequences;
+  for (const auto& entry : std::filesystem::directory_iterator(std::filesystem::path(data) / "oxford_affine"))
+  {
+    sequences.push_back(entry.path());
+  }
+  std::sort(sequences.begin(), sequences.end());
+  std::printf("%-12s | %-31s | %-31s | %-31s\n", "", "view_servo", "SIFT 500", "AKAZE");
+  std::printf("%-12s | cand  inl correct  corner     ms | cand  inl correct  corner     ms | cand  inl correct  corner"
+              "     ms\n",
+              "pair");
+  int solved[3] = {};
+  int more_than_sift = 0;
+  int total = 0;
+  for (const std::filesystem::path& sequence : sequences)
+  {
+    for (int number = 2; number <= 6; ++number)
+    {
+      const std::optional<Problem> problem = loadProblem(sequence, number);
+      if (!problem)
+      {
+        continue;
+      }
+      const Answer answers[3] = { runOurs(params, *problem), runSift(*problem), runAkaze(*problem) };
+      std::printf("%-12s", problem->name.c_str());
+      for (int i = 0; i < 3; ++i)
+      {
+        const double error = cornerError(answers[i], *problem);
+        solved[i] += error < 10.0 ? 1 : 0;
+        std::printf(" | %4d %4zu    %4d %7.2f %6.0f", correct(answers[i].candidates, problem->truth),
+                    answers[i].inliers.size(), correct(answers[i].inliers, problem->truth), error, answers[i].ms);
+      }
+      std::printf("\n");
+      ++total;
+      more_than_sift +=
+          correct(answers[0].inliers, problem->truth) > correct(answers[1].inliers, problem->truth) ? 1 : 0;
+    }
+  }
+  std::printf("solved of %d: view_servo %d, SIFT 500 %d, AKAZE %d; more correct inliers than SIFT 500: %d\n", total,
+              solved[0], solved[1], solved[2], more_than_sift);
+  return total > 0 ? 0 : 2;
+}
+
+/** A texture of Debian's packages; empty when the package is not installed. */
+cv::Mat loadTexture(const std::string& name)
+{
+  for (const char* folder : { "/usr/share/doc/opencv-doc/examples/data", "/usr/share/doc/opencv-doc/opencv4/samples/data",
+                              "/usr/share/visp-images-data/ViSP-images" })
+  {
+    if (!std::filesystem::exists(folder))
+    {
+      continue;
+    }
+    for (const auto& entry : std::filesystem::recursive_directory_iterator(folder))
+    {
+      if (entry.path().filename() == name)
+      {
+        return cv::imread(entry.path().string(), cv::IMREAD_GRAYSCALE);
+      }
+    }
+  }
+  return {};
+}
+
+/**
+ * The plane with the texture on it, facing the camera and filling the reference; then turned about `axis` (0: the
+ * image's vertical, 1: its horizontal one) and rolled by 10 degrees. 768x576, f = 800 px.
+ */
+Problem tiltedPlane(const std::string& name, const cv::Mat& texture, double tilt, int axis, std::uint64_t seed)
+{
+  const cv::Size size(768, 576);
+  Eigen::Matrix3d k;
+  k << 800.0, 0.0, 0.5 * (size.width - 1), 0.0, 800.0, 0.5 * (size.height - 1), 0.0, 0.0, 1.0;
+  const Eigen::Matrix3d rotation =
+      (Eigen::AngleAxisd(10.0 * M_PI / 180.0, Eigen::Vector3d::UnitZ()) *
+       Eigen::AngleAxisd(tilt * M_PI / 180.0, axis == 0 ? Eigen::Vector3d::UnitY() : Eigen::Vector3d::UnitX()))
+          .toRotationMatrix();
+  // The plane z = 1 of the reference camera turns about its centre: X_cur = R (X_ref - c) + c, n = c, d = 1.
+  const Eigen::Vector3d centre = Eigen::Vector3d::UnitZ();
+  const Eigen::Vector3d translation = centre - rotation * centre;
+  Problem problem;
+  problem.name = name;
+  problem.truth = k * (rotation + translation * centre.transpose()) * k.inverse();
+
+  // Both views are drawn from the texture at four times the resolution, then averaged.
+  const int over = 4;
+  Eigen::Matrix3d fit = Eigen::Matrix3d::Identity();
+  fit(0, 0) = static_cast<double>(size.width) / texture.cols;
+  fit(1, 1) = static_cast<double>(size.height) / texture.rows;
+  fit(0, 2) = 0.5 * (fit(0, 0) - 1.0);
+  fit(1, 2) = 0.5 * (fit(1, 1) - 1.0);
+  Eigen::Matrix3d enlarge = Eigen::Matrix3d::Identity();
+  enlarge(0, 0) = over;
+  enlarge(1, 1) = over;
+  enlarge(0, 2) = 0.5 * (over - 1);
+  enlarge(1, 2) = 0.5 * (over - 1);
+  cv::RNG noise(seed);
+  const auto draw = [&](const Eigen::Matrix3d& h, double gain, double offset, double sigma) {
+    const Eigen::Matrix3d map = enlarge * h * fit;
+    cv::Mat map_cv;
+    cv::eigen2cv(map, map_cv);
+    cv::Mat large;
+    cv::warpPerspective(texture, large, map_cv, size * over, cv::INTER_LINEAR, cv::BORDER_CONSTANT, cv::Scalar(128));
+    cv::Mat view;
+    cv::resize(large, view, size, 0.0, 0.0, cv::INTER_AREA);
+    view.convertTo(view, CV_32F, gain, offset);
+    cv::Mat grain(size, CV_32F);
+    noise.fill(grain, cv::RNG::NORMAL, 0.0, sigma);
+    view += grain;
+    view.convertTo(view, CV_8U);
+    return view;
+  };
+  problem.reference = draw(Eigen::Matrix3d::Identity(), 1.0, 0.0, 2.0);
+  problem.current = draw(problem.truth, 0.8, 10.0, 2.0);
+  return problem;
+}
+
+int tilt(const ViewMatcherParams& params)
+{
+  ViewMatcherParams voting_only = params;
+  voting_only.points.cyclic_order = false;
+  const std::vector<std::pair<std::string, std::function<Answer(const Problem&)>>> pipelines = {
+    { "view_servo", [&](const Problem& p) { return runOurs(params, p); } },
+    { "without cyclic order", [&](const Problem& p) { return runOurs(voting_only, p); } },
+    { "SIFT 500", runSift },
+    { "AKAZE", runAkaze },
+  };
+  std::printf("correct candidates/correct inliers, * = corner error under 5 px\n");
+  int textures = 0;
+  for (const std::string name : { "graf1.png", "Klimt.ppm", "Solvay_conference_1927_Version2_1024x705.png", "starry_night.jpg",
+                                  "baboon.jpg", "board.jpg", "building.jpg" })
+  {
+    const cv::Mat texture = loadTexture(name);
+    if (texture.empty())
+    {
+      continue;
+    }
+    ++textures;
+    for (int axis = 0; axis < 2; ++axis)
+    {
+      std::printf("%s, %s axis\n%-22s", name.c_str(), axis == 0 ? "vertical" : "horizontal", "  tilt");
+      const std::vector<int> angles = { 0, 30, 45, 50, 55, 60, 65, 70, 75, 80 };
+      std::vector<Problem> problems;
+      for (const int angle : angles)
+      {
+        std::printf("%9d ", angle);
+        problems.push_back(tiltedPlane(name, texture, angle, axis, static_cast<std::uint64_t>(angle) + 1));
+      }
+      std::printf("\n");
+      for (const auto& [pipeline, run] : pipelines)
+      {
+        std::printf("  %-20s", pipeline.c_str());
+        for (const Problem& problem : problems)
+        {
+          const Answer answer = run(problem);
+          std::printf("%4d/%4d%c", correct(answer.candidates, problem.truth), correct(answer.inliers, problem.truth),
+                      cornerError(answer, problem) < 5.0 ? '*' : ' ');
+        }
+        std::printf("\n");
+      }
+    }
+  }
+  if (textures == 0)
+  {
+    std::cout << "tilt: skipped, neither opencv-doc nor visp-images-data is installed\n";
+  }
+  return 0;
+}
+
+double median(std::vector<double> values)
+{
+  std::nth_element(values.begin(), values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2), values.end());
+  return values[values.size() / 2];
+}
+
+int timing(const ViewMatcherParams& params, int runs)
+{
+  const cv::Mat texture = loadTexture("graf1.png");
+  if (texture.empty())
+  {
+    std::cout << "time: skipped, opencv-doc is not installed\n";
+    return 0;
+  }
+  const Problem problem = tiltedPlane("graf1.png", texture, 45.0, 0, 1);
+  std::printf("%s tilted by 45 degrees, 768x576, %d threads, medians of %d runs in ms\n", problem.name.c_str(),
+              cv::getNumThreads(), runs);
+  const ViewMatcher matcher(params);
+  const PreparedImage stored(problem.reference, cv::Rect(), params.points);
+  std::vector<double> fresh_ms;
+  std::vector<double> stored_ms;
+  std::vector<double> sift_ms;
+  std::vector<double> akaze_ms;
+  std::vector<StageTime> stages;
+  for (int run = 0; run < runs + 1; ++run)
+  {
+    const double ours = runOurs(params, problem).ms;
+    const auto start = std::chrono::steady_clock::now();
+    const PreparedImage current(problem.current, cv::Rect(), params.points);
+    const ViewMatch match = matcher.match(stored, current, GeometryModel::HOMOGRAPHY);
+    const double against_stored = millisecondsSince(start);
+    const double sift = runSift(problem).ms;
+    const double akaze = runAkaze(problem).ms;
+    if (run > 0)  // the first warms up
+    {
+      fresh_ms.push_back(ours);
+      stored_ms.push_back(against_stored);
+      sift_ms.push_back(sift);
+      akaze_ms.push_back(akaze);
+      stages = match.stages;
+    }
+  }
+  const double sift = median(sift_ms);
+  std::printf("SIFT 500              %7.1f\n", sift);
+  std::printf("AKAZE                 %7.1f  %.2f of SIFT\n", median(akaze_ms), median(akaze_ms) / sift);
+  std::printf("both images fresh     %7.1f  %.2f of SIFT\n", median(fresh_ms), median(fresh_ms) / sift);
+  std::printf("reference stored      %7.1f  %.2f of SIFT\n", median(stored_ms), median(stored_ms) / sift);
+  for (const StageTime& stage : stages)
+  {
+    std::printf("  %-20s%7.1f\n", stage.name.c_str(), stage.ms);
+  }
+  return 0;
+}
+
+/** Peak memory of the process after one match [MB]; a mode of its own, as the peers need more. */
+int memory(const ViewMatcherParams& params)
+{
+  const cv::Mat texture = loadTexture("graf1.png");
+  if (texture.empty())
+  {
+    std::cout << "memory: skipped, opencv-doc is not installed\n";
+    return 0;
+  }
+  cv::Mat reference;
+  cv::resize(texture, reference, cv::Size(768, 576), 0.0, 0.0, cv::INTER_AREA);
+  Problem problem{ "graf1.png", reference, reference.clone(), Eigen::Matrix3d::Identity() };
+  runOurs(params, problem);
+  rusage usage{};
+  getrusage(RUSAGE_SELF, &usage);
+  std::printf("peak memory %.0f MB\n", static_cast<double>(usage.ru_maxrss) / 1024.0);
+  return 0;
+}
+
+}  // namespace
+
+int main(int argc, char** argv)
+{
+  const std::string usage = "usage: bench_points oxford|tilt|time|memory [--runs N] [--set name=value ...]\n";
+  ViewMatcherParams params;
+  int runs = 15;
+  try
+  {
+    for (int i = 2; i + 1 < argc; i += 2)
+    {
+      const std::string option = argv[i];
+      const std::string value = argv[i + 1];
+      const std::size_t equals = value.find('=');
+      if (option == "--runs")
+      {
+        runs = std::max(1, std::stoi(value));
+      }
+      else if (option == "--set" && equals != std::string::npos)
+      {
+        setParameter(params, value.substr(0, equals), value.substr(equals + 1));
+      }
+      else
+      {
+        std::cerr << usage;
+        return 2;
+      }
+    }
+    cv::setNumThreads(2);
+    const std::string mode = argc > 1 ? argv[1] : "";
+    if (mode == "oxford")
+    {
+      return oxford(params);
+    }
+    if (mode == "tilt")
+    {
+      return tilt(params);
+    }
+    if (mode == "time")
+    {
+      return timing(params, runs);
+    }
+    if (mode == "memory")
+    {
+      return memory(params);
+    }
+  }
+  catch (const std::exception& error)
+  {
+    std::cerr << error.what() << "\n";
+    return 2;
+  }
+  std::cerr << usage;
+  return 2;
+}

@@ -1,0 +1,44 @@
+// Copyright (c) 2026, the view_servo authors
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <Eigen/Core>
+#include <opencv2/core/mat.hpp>
+
+#include <string>
+#include <vector>
+
+namespace view_servo
+{
+/** Options of the Harris detector (thesis 2.7; eq. 2.20-2.24). */
+struct CornerParams
+{
+  int max_corners = 500;           ///< the strongest are kept, >= 1
+  double derivative_sigma = 0.7;   ///< Gaussian derivative scale [px], > 0
+  double integration_sigma = 1.4;  ///< Gaussian window of the second-moment matrix [px], > 0
+  double k = 0.04;                 ///< in R = det(M) - k tr(M)², [0, 0.25)
+  double min_distance = 2.0;       ///< no two corners closer than this [px], >= 0
+  double relative_threshold = 0.0; ///< smallest response as a fraction of the strongest, [0, 1)
+  int border = 4;                  ///< no corners closer than this to the image's border [px], >= 1
+
+  /** All faults, one a line; empty when the parameters are usable. */
+  std::vector<std::string> validate() const;
+};
+
+/** A corner: sub-pixel position [px], (0, 0) at the centre of the top-left pixel. */
+struct Corner
+{
+  Eigen::Vector2d position;
+  float response;  ///< Harris measure R of eq. 2.24 (grey levels⁴)
+};
+
+/**
+ * Harris corners, strongest first: 8-way local maxima of R > 0, each refined by a quadratic fit to its 3x3
+ * neighbourhood.
+ * @param image 8-bit, one channel.
+ * @param mask 8-bit, same size, non-zero where corners are wanted; empty = everywhere.
+ * @throws std::invalid_argument when the image or the mask has the wrong type or size.
+ */
+std::vector<Corner> detectCorners(const cv::Mat& image, const CornerParams& params, const cv::Mat& mask = cv::Mat());
+
+}  // namespace view_servo

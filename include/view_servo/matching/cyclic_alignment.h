@@ -1,0 +1,49 @@
+// Copyright (c) 2026, the view_servo authors
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <cstddef>
+#include <vector>
+
+namespace view_servo
+{
+/**
+ * Best one-to-one alignment of two cyclic strings that keeps the cyclic order (thesis 7.3, eq. 7.4).
+ *
+ * Weighted longest common subsequence over all rotations of the second string, exact, by divide and conquer over the
+ * rotations: an optimal path of a rotation can always be found between those of a smaller and a larger one, so each
+ * is confined to the band between two found before (Maes 1990; Gregor & Thomason 1993). O(m n log n) for m x n weights.
+ *
+ * An object keeps its work space between calls: one per thread.
+ */
+class CyclicAligner
+{
+public:
+  /**
+   * Largest total weight of pairs (r_1, c_1), .., (r_p, c_p) with r_k strictly increasing and, after some rotation of
+   * the columns, c_k strictly increasing.
+   * @param weights rows x columns, row-major, each >= 0.
+   */
+  float align(const float* weights, int rows, int columns);
+
+private:
+  /** For each row of the table, the first and the last column on a path. */
+  struct Path
+  {
+    std::vector<int> first;
+    std::vector<int> last;
+  };
+
+  void alignRotation(int rotation, const Path* left, const Path* right, Path& path);
+  void divide(int left_rotation, int right_rotation, std::size_t left, std::size_t right);
+
+  const float* weights_ = nullptr;
+  int rows_ = 0;
+  int columns_ = 0;
+  float best_ = 0.0F;
+  std::vector<float> table_;  // (rows_ + 1) x (2 columns_ + 1)
+  std::vector<Path> paths_;   // a stack: two for the ends, one a level of division
+  std::size_t stack_size_ = 0;
+};
+
+}  // namespace view_servo

@@ -1,0 +1,56 @@
+// Copyright (c) 2026, the view_servo authors
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include "view_servo/features/corners.h"
+#include "view_servo/matching/association.h"
+
+#include <Eigen/Core>
+#include <opencv2/core/mat.hpp>
+
+#include <string>
+#include <vector>
+
+namespace view_servo
+{
+/** Options of looking for more matches along a geometry that was found. */
+struct GuidedParams
+{
+  int patch_radius = 6;          ///< patches of (2 r + 1)² pixels are compared [px], 1 to 50
+  double min_correlation = 0.6;  ///< of the current patch with the warped reference patch, [0, 1)
+
+  /** All faults, one a line; empty when the parameters are usable. */
+  std::vector<std::string> validate() const;
+};
+
+/** A reference corner found again in the current image. */
+struct GuidedMatch
+{
+  int reference;            ///< index of the corner
+  Eigen::Vector2d current;  ///< sub-pixel position [px]
+  double correlation;       ///< of the patches, in [min_correlation, 1]
+};
+
+/**
+ * Looks for every reference corner near where a homography (reference -> current) sends it: the place, to a fraction of
+ * a pixel, at which the reference patch, warped by the homography's affine approximation, has its largest zero-mean
+ * normalised correlation with the current image. So a corner is found again whether or not the detector found it.
+ * Corners whose best place lies on the rim of the search region, or correlates too little, are left out.
+ * @param radius of the search region around the prediction, in each direction [px]
+ * Images are 8-bit grey.
+ */
+std::vector<GuidedMatch> searchAlongHomography(const cv::Mat& reference, const std::vector<Corner>& corners,
+                                               const cv::Mat& current, const Eigen::Matrix3d& h, double radius,
+                                               const GuidedParams& params);
+
+/**
+ * Associates the corners that were associated before and agree with a fundamental matrix (x_curᵀ F x_ref = 0) up to
+ * `threshold`: Sampson distance [px]. A line says less than a point, so the former association decides with: weights
+ * are the fit, 0 to 1, plus the former weight as a fraction of the largest (thesis 9.6.3).
+ */
+AssociationMatrix associateAlongFundamental(const AssociationMatrix& association,
+                                            const std::vector<Corner>& reference_corners,
+                                            const std::vector<Corner>& current_corners, const Eigen::Matrix3d& f,
+                                            double threshold);
+
+}  // namespace view_servo

@@ -1,0 +1,62 @@
+// Copyright (c) 2026, the view_servo authors
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include "view_servo/features/corners.h"
+#include "view_servo/features/profiles.h"
+#include "view_servo/matching/assignment.h"
+#include "view_servo/matching/association.h"
+#include "view_servo/matching/profile_index.h"
+
+#include <opencv2/core/mat.hpp>
+
+#include <string>
+#include <vector>
+
+namespace view_servo
+{
+enum class AssignmentMethod
+{
+  EXACT,  ///< maximumWeightMatching()
+  GREEDY  ///< greedyMatching()
+};
+
+/** Options of matching by intensity profiles (thesis ch. 6 and 7). */
+struct PointMatcherParams
+{
+  CornerParams corners;
+  ProfileParams profiles;
+  ProfileSearchParams search;
+  AssignmentMethod assignment = AssignmentMethod::EXACT;
+  bool cyclic_order = true;      ///< weigh associations by cyclic alignment of the profiles that voted (ch. 7)
+  double min_correlation = 0.7;  ///< profiles correlated less do not align (7.3), [0, 1)
+  int cyclic_entries = 8;        ///< aligned are a row's and a column's entries with that many most votes; 0 = all
+
+  /** All faults, one a line; empty when the parameters are usable. */
+  std::vector<std::string> validate() const;
+};
+
+/** What matching needs to know of one image. */
+struct PointFeatures
+{
+  std::vector<Corner> corners;
+  ProfileSet profiles;
+};
+
+/** Corners and profiles of an 8-bit, one-channel image; mask as in detectCorners(). */
+PointFeatures extractPointFeatures(const cv::Mat& image, const PointMatcherParams& params,
+                                   const cv::Mat& mask = cv::Mat());
+
+/**
+ * Association of the corners of two images by the votes of their similar profiles: 1/K_v for start with start and end
+ * with end (6.1.4). With `cyclic_order` an entry's weight is that of the best one-to-one, cyclically ordered alignment
+ * of the profiles that voted for it (eq. 7.4), and entries not aligned are left out.
+ * @param index the index over reference.profiles.
+ */
+AssociationMatrix associatePoints(const PointFeatures& reference, const ProfileIndex& index,
+                                  const PointFeatures& current, const PointMatcherParams& params);
+
+/** One-to-one candidates from an association, best first. */
+std::vector<Association> candidateMatches(const AssociationMatrix& association, AssignmentMethod method);
+
+}  // namespace view_servo

@@ -1,0 +1,88 @@
+// Copyright (c) 2026, the view_servo authors
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <optional>
+#include <random>
+#include <string>
+#include <vector>
+
+namespace view_servo
+{
+/** Portable generator: std::mt19937_64's output is fixed by the standard; uniformIndex() fixes the rest. */
+using Rng = std::mt19937_64;
+
+/** Uniform integer in [0, count), the same on every machine (std::uniform_int_distribution is not). count > 0. */
+std::size_t uniformIndex(Rng& rng, std::size_t count);
+
+enum class Sampling
+{
+  UNIFORM,     ///< every datum equally likely
+  PROGRESSIVE  ///< from the best-first prefix, growing (PROSAC, Chum & Matas 2005); data must be sorted best first
+};
+
+/** Options of the one RANSAC loop. */
+struct RansacParams
+{
+  double inlier_threshold = 3.0;  ///< largest error of an inlier [px], > 0
+  double confidence = 0.999;      ///< wanted probability that an outlier-free sample was drawn, (0, 1)
+  int min_iterations = 100;       ///< samples solved before the adaptive stop (thesis eq. 9.5) may end it, >= 0
+  int max_iterations = 2000;      ///< samples solved at most, >= 1
+  int max_rejected = 50000;       ///< samples that the estimator's cheap test may refuse, in all, >= 0
+  int local_optimizations = 10;   ///< refits to the inliers of a new best model (Chum, Matas & Kittler 2003), 0 = off
+  bool improvement_stage = false; ///< thesis 9.4: replace each datum of the best sample by every other one in turn
+  Sampling sampling = Sampling::PROGRESSIVE;
+
+  /** All faults, one a line; empty when the parameters are usable. */
+  std::vector<std::string> validate() const;
+};
+
+enum class RansacStop
+{
+  CONFIDENCE_REACHED,
+  ITERATION_LIMIT,
+  REJECTION_LIMIT,
+  TOO_FEW_DATA
+};
+
+struct RansacStatistics
+{
+  int iterations = 0;           ///< samples solved
+  int rejected_samples = 0;     ///< samples refused by the estimator before solving
+  int models = 0;               ///< models scored
+  int local_optimizations = 0;  ///< refits that improved the best model
+  RansacStop stop = RansacStop::TOO_FEW_DATA;
+  double elapsed_ms = 0.0;
+};
+
+template <typename Model>
+struct RansacResult
+{
+  std::optional<Model> model;  ///< empty: no sample gave a model
+  std::vector<int> inliers;    ///< indices of the data within the threshold, ascending
+  double cost = 0.0;           ///< sum over all data of min(error², threshold²) (MSAC) [px²]
+  RansacStatistics statistics;
+};
+
+/**
+ * Random sample consensus over an estimator (Fischler & Bolles 1981; thesis ch. 2.6) with truncated quadratic scores
+ * (MSAC, Torr & Zisserman 2000), adaptive stop, local optimisation and progressive sampling.
+ *
+ * An Estimator is a small type with
+ *  - `using Model`, `static constexpr int SAMPLE_SIZE`,
+ *  - `std::size_t size() const`: number of data,
+ *  - `bool accepts(const std::vector<int>& sample) const`: cheap test before solving,
+ *  - `void solve(const std::vector<int>& sample, std::vector<Model>& models) const`: appends the minimal solutions,
+ *  - `double error(const Model&, std::size_t i) const`: squared error of datum i [px²], possibly infinite,
+ *  - `std::optional<Model> refit(const Model&, const std::vector<int>& inliers) const`: fit to many.
+ *
+ * The same generator state and data give the same result on every machine.
+ */
+template <typename Estimator>
+RansacResult<typename Estimator::Model> ransac(const Estimator& estimator, const RansacParams& params, Rng& rng);
+
+}  // namespace view_servo
+
+#include "view_servo/robust/impl/ransac.hpp"

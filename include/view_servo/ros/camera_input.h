@@ -1,0 +1,94 @@
+// Copyright (c) 2026, the view_servo authors
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include "view_servo/ros/parameters.h"
+
+#include <diagnostic_updater/DiagnosticStatusWrapper.h>
+#include <image_transport/image_transport.h>
+#include <image_transport/subscriber_filter.h>
+#include <message_filters/subscriber.h>
+#include <message_filters/time_synchronizer.h>
+#include <ros/node_handle.h>
+#include <ros/wall_timer.h>
+#include <sensor_msgs/CameraInfo.h>
+#include <sensor_msgs/Image.h>
+
+#include <functional>
+#include <mutex>
+#include <string>
+
+namespace view_servo
+{
+/** An image with its calibration. */
+struct CameraFrame
+{
+  sensor_msgs::ImageConstPtr image;
+  sensor_msgs::CameraInfoConstPtr info;
+};
+
+struct CameraInputParams
+{
+  int queue_size = 5;
+  double max_image_age = 1.0;
+
+  static CameraInputParams read(ParameterReader& reader);
+};
+
+/**
+ * A node's camera: the newest image that comes with a calibration of the same stamp.
+ *
+ * Subscribes to `image_raw` (sensor_msgs/Image) and `camera_info` (sensor_msgs/CameraInfo), each of which can be
+ * remapped by itself. Parameters:
+ *  - `~image_transport` (string, default "raw"): how images travel;
+ *  - `~queue_size` (int, default 5, >= 1): images that wait for their camera_info, and the other way round;
+ *  - `~max_image_age` (double, default 1.0 [s], > 0): an older image is not the camera's present view.
+ *
+ * A frame that cannot be used (camera not calibrated, or calibrated for another size) is dropped, with a throttled error
+ * that names both topics; so is the lack of either topic, or of common stamps. Images are kept by stamp, not by arrival:
+ * when time jumps back (a bag that loops), those from the future count as too old.
+ */
+class CameraInput
+{
+public:
+  using Callback = std::function<void(const CameraFrame&)>;
+
+  /** @param on_frame called for every usable frame, from a spinner's thread; has to be quick. */
+  CameraInput(const ros::NodeHandle& nh, const CameraInputParams& params, Callback on_frame = Callback());
+
+  /** @throws ImageError, saying why, when there is no usable frame or it is too old. */
+  CameraFrame latest() const;
+
+  /** Where images come from, resolved. */
+  std::string imageTopic() const
+  {
+    return image_subscriber_.getTopic();
+  }
+
+  void diagnose(diagnostic_updater::DiagnosticStatusWrapper& status);
+
+private:
+  void frameCallback(const sensor_msgs::ImageConstPtr& image, const sensor_msgs::CameraInfoConstPtr& info);
+  void checkInputs();
+  std::string topics() const;
+
+  CameraInputParams params_;
+  Callback on_frame_;
+  mutable std::mutex mutex_;
+  CameraFrame latest_;
+  std::string problem_;         // why the last frame was not usable, or none came
+  int images_ = 0;              // since the last check
+  int infos_ = 0;
+  int pairs_ = 0;
+  double rate_ = 0.0;           // of usable frames [Hz]
+  int frames_ = 0;              // usable, since the last diagnosis
+  ros::WallTime last_diagnosis_;
+
+  image_transport::ImageTransport transport_;
+  image_transport::SubscriberFilter image_subscriber_;
+  message_filters::Subscriber<sensor_msgs::CameraInfo> info_subscriber_;
+  message_filters::TimeSynchronizer<sensor_msgs::Image, sensor_msgs::CameraInfo> synchronizer_;
+  ros::WallTimer check_timer_;
+};
+
+}  // namespace view_servo

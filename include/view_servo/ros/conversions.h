@@ -1,0 +1,67 @@
+// Copyright (c) 2026, the view_servo authors
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include "view_servo/Homography.h"
+#include "view_servo/PointMatch.h"
+#include "view_servo/geometry/camera.h"
+#include "view_servo/views/view_matcher.h"
+#include "view_servo/views/view_store.h"
+
+#include <Eigen/Core>
+#include <geometry_msgs/PoseStamped.h>
+#include <geometry_msgs/TransformStamped.h>
+#include <opencv2/core/mat.hpp>
+#include <sensor_msgs/CameraInfo.h>
+#include <sensor_msgs/Image.h>
+#include <sensor_msgs/RegionOfInterest.h>
+#include <std_msgs/Header.h>
+
+#include <string>
+#include <vector>
+
+namespace view_servo
+{
+/** @file
+ * Between the core's types and messages. All of them are values: nothing refers to its source afterwards.
+ */
+
+/** Whether K says anything: REP 104 has an uncalibrated camera send it all zero. */
+bool isCalibrated(const sensor_msgs::CameraInfo& info);
+
+/**
+ * The camera of the image that comes with `info`: binning and region of interest are worked into the size, the
+ * intrinsics and the projection, so that they hold for the pixels of that image.
+ */
+Camera toCamera(const sensor_msgs::CameraInfo& info);
+sensor_msgs::CameraInfo toCameraInfo(const Camera& camera, const std_msgs::Header& header);
+
+/**
+ * An image as 8-bit grey: mono, BGR(A), RGB(A), Bayer and YUV 4:2:2 encodings, 8 or 16 bit.
+ * @param name what an error calls the image.
+ * @throws ImageError when the encoding or the size cannot be used, or the data does not fit the size.
+ */
+cv::Mat toGrey(const sensor_msgs::Image& image, const std::string& name);
+sensor_msgs::Image toImage(const cv::Mat& image, const std::string& encoding, const std_msgs::Header& header);
+
+/** Width and height 0 stand for the whole image, as an empty rectangle. @throws ImageError when it leaves the image. */
+cv::Rect toRect(const sensor_msgs::RegionOfInterest& roi, const cv::Size& image);
+sensor_msgs::RegionOfInterest toRegionOfInterest(const cv::Rect& rect);
+
+/** The transform tf gives for target = ViewPose::frame, source = the view's frame. */
+ViewPose toViewPose(const geometry_msgs::TransformStamped& transform);
+geometry_msgs::PoseStamped toPoseStamped(const ViewPose& pose, const ros::Time& stamp);
+
+std::vector<PointMatch> toPointMatches(const std::vector<MatchedPoint>& matches);
+
+/** Row-major. Messages hold boost::array in some ROS releases and std::array in others. */
+template <typename Array>
+void copyRowMajor(const Eigen::Matrix3d& matrix, Array& array)
+{
+  Eigen::Map<Eigen::Matrix<double, 3, 3, Eigen::RowMajor>>(array.data()) = matrix;
+}
+
+/** State TRACKING and valid when `match` found a homography, else SEARCHING; not decomposed. */
+Homography toHomography(const ViewMatch& match, const std::string& view, const std_msgs::Header& header);
+
+}  // namespace view_servo

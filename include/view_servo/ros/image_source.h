@@ -1,0 +1,79 @@
+// Copyright (c) 2026, the view_servo authors
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include "view_servo/ImageSource.h"
+#include "view_servo/ros/camera_input.h"
+#include "view_servo/ros/parameters.h"
+#include "view_servo/views/view_store.h"
+
+#include <opencv2/core/mat.hpp>
+#include <opencv2/core/types.hpp>
+#include <std_msgs/Header.h>
+
+#include <filesystem>
+#include <optional>
+#include <string>
+
+namespace view_servo
+{
+enum class SourceKind
+{
+  CAMERA,
+  VIEW,
+  PATH,
+  IMAGE
+};
+
+/**
+ * Which field of `source` is set; CAMERA when none is.
+ * @param name what an error calls the source, e.g. the field of the request that it is.
+ * @throws ImageError naming the fields when several are set.
+ */
+SourceKind kindOf(const ImageSource& source, const std::string& name);
+
+/** An image with what is known about it. */
+struct SourcedImage
+{
+  cv::Mat grey;
+  cv::Rect region;  ///< empty = the whole image
+  std_msgs::Header header;
+  std::optional<Camera> camera;
+  std::optional<ViewPose> pose;
+};
+
+struct ImageSourceParams
+{
+  std::filesystem::path views_dir;
+  bool allow_paths = true;
+
+  static ImageSourceParams read(ParameterReader& reader);
+};
+
+/**
+ * Turns the ImageSource of a request into an image. Parameters:
+ *  - `~views_dir` (string, default "" = $ROS_HOME/view_servo/views): where stored views are;
+ *  - `~allow_paths` (bool, default true): whether requests may name files. They are read with the node's rights, so
+ *    turn it off where requests come from strangers.
+ */
+class ImageSourceReader
+{
+public:
+  /** `camera` must outlive the reader. */
+  ImageSourceReader(const ImageSourceParams& params, const CameraInput& camera);
+
+  /** @throws ImageError or ViewStoreError, naming what is wrong in one line. @param name as in kindOf(). */
+  SourcedImage read(const ImageSource& source, const std::string& name) const;
+
+  const ViewStore& store() const
+  {
+    return store_;
+  }
+
+private:
+  bool allow_paths_;
+  ViewStore store_;
+  const CameraInput& camera_;
+};
+
+}  // namespace view_servo

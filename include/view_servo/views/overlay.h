@@ -1,0 +1,18 @@
+// Copyright (c) 2026, the view_servo authors
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include "view_servo/views/view_matcher.h"
+
+#include <opencv2/core/mat.hpp>
+
+namespace view_servo
+{
+/**
+ * A picture of a match, BGR: reference left, current right, inliers joined by lines coloured by their place in the
+ * reference, other candidates as small dots; for a homography the outline of the reference's region is drawn in both
+ * images. A line of text below says what was found (or why nothing was).
+ */
+cv::Mat drawOverlay(const PreparedImage& reference, const PreparedImage& current, const ViewMatch& match);
+
+}  // namespace view_servo

@@ -1,0 +1,71 @@
+// Copyright (c) 2026, the view_servo authors
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include "view_servo/matching/point_matcher.h"
+
+#include <Eigen/Core>
+#include <opencv2/core/mat.hpp>
+#include <opencv2/core/types.hpp>
+
+#include <array>
+#include <memory>
+#include <mutex>
+
+namespace view_servo
+{
+/**
+ * An image with the features that matching asks for, each computed once, when it is first needed: a stored view that
+ * is kept costs nothing for the next live image. Safe to use from several threads.
+ *
+ * Level l is the image reduced by 2^(l/2) on each side. Its features are in its own pixels; toFull() maps them.
+ */
+class PreparedImage
+{
+public:
+  static constexpr int LEVELS = 5;
+
+  /**
+   * @param grey 8-bit, one channel; shared, not to be written to afterwards.
+   * @param region where features are looked for [px]; empty = everywhere.
+   * @throws std::invalid_argument when the image has the wrong type or the region leaves it.
+   */
+  PreparedImage(cv::Mat grey, const cv::Rect& region, const PointMatcherParams& params);
+
+  const cv::Mat& grey() const
+  {
+    return grey_;
+  }
+  const cv::Rect& region() const
+  {
+    return region_;
+  }
+
+  /** The reduced image; small ones (a side under 64 px) are empty, and so are their features. */
+  const cv::Mat& image(int level) const;
+  const PointFeatures& points(int level) const;
+  const ProfileIndex& profileIndex(int level) const;
+
+  /** Maps pixels of a level to pixels of the full image (homogeneous; a scale and a shift). */
+  Eigen::Matrix3d toFull(int level) const;
+
+private:
+  struct Level
+  {
+    std::once_flag image_once;
+    std::once_flag points_once;
+    std::once_flag index_once;
+    cv::Mat image;
+    PointFeatures points;
+    std::unique_ptr<ProfileIndex> index;
+  };
+
+  Level& level(int number) const;
+
+  cv::Mat grey_;
+  cv::Rect region_;
+  PointMatcherParams params_;
+  mutable std::array<Level, LEVELS> levels_;
+};
+
+}  // namespace view_servo

@@ -1,0 +1,44 @@
+// Copyright (c) 2026, the view_servo authors
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include "view_servo/views/prepared_image.h"
+#include "view_servo/views/view_store.h"
+
+#include <cstddef>
+#include <list>
+#include <memory>
+#include <mutex>
+#include <string>
+
+namespace view_servo
+{
+/**
+ * Stored views that keep their features, so that a reference is read and indexed once however many images are matched
+ * with it. Holds the views used last; one that was saved anew is read again. Safe to use from several threads.
+ */
+class ViewCache
+{
+public:
+  /** @param capacity views kept, >= 1. */
+  ViewCache(ViewStore store, const PointMatcherParams& params, std::size_t capacity = 4);
+
+  /** @throws ViewStoreError as ViewStore::load(). */
+  std::shared_ptr<const PreparedImage> get(const std::string& name);
+
+private:
+  struct Entry
+  {
+    std::string name;
+    std::string revision;
+    std::shared_ptr<const PreparedImage> image;
+  };
+
+  ViewStore store_;
+  PointMatcherParams params_;
+  std::size_t capacity_;
+  std::mutex mutex_;
+  std::list<Entry> entries_;  // used last first
+};
+
+}  // namespace view_servo

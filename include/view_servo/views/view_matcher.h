@@ -1,0 +1,109 @@
+// Copyright (c) 2026, the view_servo authors
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include "view_servo/geometry/correspondence.h"
+#include "view_servo/matching/guided_matching.h"
+#include "view_servo/matching/point_matcher.h"
+#include "view_servo/robust/ransac.h"
+#include "view_servo/robust/view_consistency.h"
+#include "view_servo/views/prepared_image.h"
+
+#include <Eigen/Core>
+
+#include <cstdint>
+#include <string>
+#include <vector>
+
+namespace view_servo
+{
+enum class GeometryModel
+{
+  HOMOGRAPHY,  ///< x_cur ~ H x_ref, for planes
+  FUNDAMENTAL  ///< x_curᵀ F x_ref = 0, for scenes with depth
+};
+
+/** Where the constraint on five points is used (thesis 6.3); it has no meaning for homographies within RANSAC. */
+enum class ViewConsistency
+{
+  OFF,
+  BEFORE,  ///< method 1: candidates are filtered
+  WITHIN   ///< method 2: samples are tested
+};
+
+/** Options of the whole way from two images to their geometry. */
+struct ViewMatcherParams
+{
+  PointMatcherParams points;
+  RansacParams ransac;
+  ViewConsistency view_consistency = ViewConsistency::WITHIN;
+  ViewConsistencyParams consistency;
+  bool guided = true;           ///< look for more matches along the geometry found
+  GuidedParams guidance;
+  bool scale_search = true;     ///< try other scale ratios and coarser scales when the first finds no geometry
+  double min_log_significance = 6.0;  ///< -log10 of the number of false alarms that a geometry may have at most, >= 0
+  std::uint64_t seed = 1;
+
+  /** All faults, one a line; empty when the parameters are usable. */
+  std::vector<std::string> validate() const;
+};
+
+enum class MatchOutcome
+{
+  MATCHED,
+  TOO_FEW_FEATURES,
+  NO_GEOMETRY
+};
+
+struct MatchedPoint
+{
+  Correspondence position;  ///< pixels of the full images
+  double score;             ///< association weight; larger is better
+  bool inlier;
+};
+
+struct StageTime
+{
+  std::string name;
+  double ms;
+};
+
+/** What matching two images says: the one result type of image pairs. */
+struct ViewMatch
+{
+  MatchOutcome outcome = MatchOutcome::NO_GEOMETRY;
+  std::string message;         ///< one line, for people
+  GeometryModel model = GeometryModel::HOMOGRAPHY;
+  Eigen::Matrix3d matrix;      ///< NaN unless MATCHED; H with H(2,2) = 1 where possible, F with norm 1
+  std::vector<MatchedPoint> matches;  ///< all candidates, best first
+  int inliers = 0;
+  double rms_error = 0.0;      ///< of the inliers: transfer error in one image (H) or Sampson distance (F) [px]; NaN: none
+  double log_significance = 0.0;  ///< -log10 of the expected number of geometries this good among chance matches
+  int reference_level = 0;     ///< of PreparedImage, where the geometry was found
+  int current_level = 0;
+  RansacStatistics ransac;     ///< of the attempt that succeeded, else of the last
+  std::vector<StageTime> stages;
+  double elapsed_ms = 0.0;
+};
+
+/** Matches two views of a scene by intensity profiles. Stateless between calls: the same input gives the same result. */
+class ViewMatcher
+{
+public:
+  /** @throws std::invalid_argument with all faults of the parameters. */
+  explicit ViewMatcher(const ViewMatcherParams& params);
+
+  const ViewMatcherParams& params() const
+  {
+    return params_;
+  }
+
+  /** Both images must have been prepared with params().points. @param inlier_threshold [px], 0 = as in the params. */
+  ViewMatch match(const PreparedImage& reference, const PreparedImage& current, GeometryModel model,
+                  double inlier_threshold = 0.0) const;
+
+private:
+  ViewMatcherParams params_;
+};
+
+}  // namespace view_servo

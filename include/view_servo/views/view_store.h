@@ -1,0 +1,97 @@
+// Copyright (c) 2026, the view_servo authors
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include "view_servo/geometry/camera.h"
+
+#include <Eigen/Geometry>
+#include <opencv2/core/mat.hpp>
+#include <opencv2/core/types.hpp>
+
+#include <filesystem>
+#include <optional>
+#include <stdexcept>
+#include <string>
+#include <vector>
+
+namespace view_servo
+{
+/** A pose as tf gives it: maps points of the view's frame into `frame`. Metres. */
+struct ViewPose
+{
+  std::string frame;
+  Eigen::Vector3d position = Eigen::Vector3d::Zero();
+  Eigen::Quaterniond orientation = Eigen::Quaterniond::Identity();
+};
+
+/** A picture of where the camera should be, with all that was known when it was taken. */
+struct StoredView
+{
+  std::string name;             ///< see isValidViewName()
+  cv::Mat image;                ///< 8-bit grey
+  cv::Rect region;              ///< region of interest [px]; empty = the whole image
+  std::optional<Camera> camera;
+  double stamp = 0.0;           ///< when the image was taken [s since the epoch of its clock]
+  std::string frame_id;         ///< optical frame of the camera, may be empty
+  std::optional<ViewPose> pose; ///< of `frame_id`, where tf knew it
+};
+
+/** Why a view cannot be stored, read or removed; what() names the view, in one line. */
+class ViewStoreError : public std::runtime_error
+{
+public:
+  using std::runtime_error::runtime_error;
+};
+
+/** Whether a name matches [A-Za-z0-9][A-Za-z0-9_-]{0,63}: it is also a file's name, so nothing else is let through. */
+bool isValidViewName(const std::string& name);
+
+/**
+ * Stored views in a directory, one `NAME.yaml` each beside its image `NAME.HASH.png`.
+ *
+ * The yaml file is what makes a view exist: it names the image, its size and checksum, and is put in place by rename(2)
+ * after image and yaml were written and synced, so a crash leaves either the old view or the new one, and at most
+ * an unreferenced file, which the next save or removal of that name deletes. Views are independent files: a damaged
+ * one is reported by name and takes no other with it. Safe for several processes as long as one at a time writes a name.
+ */
+class ViewStore
+{
+public:
+  /** The directory need not exist until something is saved. */
+  explicit ViewStore(std::filesystem::path directory);
+
+  const std::filesystem::path& directory() const
+  {
+    return directory_;
+  }
+
+  /** @throws ViewStoreError for a bad name, image or region, for a name in use unless `overwrite`, on a full disk. */
+  void save(const StoredView& view, bool overwrite) const;
+
+  /** @throws ViewStoreError when there is no such view or it is damaged. */
+  StoredView load(const std::string& name) const;
+
+  /** Changes whenever the view is saved anew; cheap. @throws ViewStoreError as load(), without reading the image. */
+  std::string revision(const std::string& name) const;
+
+  struct Damaged
+  {
+    std::string name;
+    std::string reason;
+  };
+  struct Listing
+  {
+    std::vector<std::string> names;  ///< readable views, sorted
+    std::vector<Damaged> damaged;    ///< sorted by name
+  };
+  /** Checks every view's yaml and image. */
+  Listing list() const;
+
+  /** @throws ViewStoreError when there is no such view; damaged views can be removed. */
+  void remove(const std::string& name) const;
+
+private:
+  std::filesystem::path directory_;
+};
+
+}  // namespace view_servo

@@ -1,0 +1,288 @@
+// Copyright (c) 2026, the view_servo authors
+// SPDX-License-Identifier: BSD-3-Clause
+#include "view_servo/features/profiles.h"
+
+#include <opencv2/core.hpp>
+
+#include <algorithm>
+#include <cmath>
+#include <stdexcept>
+
+namespace view_servo
+{
+namespace
+{
+constexpr int MAX_COEFFICIENTS = 8;
+// Profiles are sampled about once a pixel; the number is a multiple of this, so that few basis tables are needed, ...
+constexpr int SAMPLE_STEP = 8;
+// ... and bounded, since eight low-order features need no more. [samples]
+constexpr int MAX_SAMPLES = 48;
+
+int sampleCount(double length)
+{
+  const int steps = static_cast<int>(std::ceil(length / SAMPLE_STEP));
+  return std::min(MAX_SAMPLES, std::max(SAMPLE_STEP, steps * SAMPLE_STEP));
+}
+
+/** The basis vectors of eq. 6.3 at (i + 1/2)/N, divided by N; row i holds sin 1, cos 1, sin 2, .. */
+class Basis
+{
+public:
+  Basis(int samples, int coefficients) : values_(static_cast<std::size_t>(samples * coefficients)), sums_{}
+  {
+    for (int i = 0; i < samples; ++i)
+    {
+      for (int c = 0; c < coefficients; ++c)
+      {
+        const double phase = M_PI * (c / 2 + 1) * (i + 0.5) / samples;
+        const double value = (c % 2 == 0 ? std::sin(phase) : std::cos(phase)) / samples;
+        values_[static_cast<std::size_t>(i * coefficients + c)] = static_cast<float>(value);
+        sums_[c] += static_cast<float>(value);
+      }
+    }
+  }
+  const float* row(int i, int coefficients) const
+  {
+    return values_.data() + static_cast<std::size_t>(i * coefficients);
+  }
+  float sum(int c) const
+  {
+    return sums_[c];
+  }
+
+private:
+  std::vector<float> values_;
+  float sums_[MAX_COEFFICIENTS];
+};
+
+/** All tables that profiles up to a length need. */
+std::vector<Basis> basisTables(int coefficients)
+{
+  std::vector<Basis> tables;
+  for (int samples = SAMPLE_STEP; samples <= MAX_SAMPLES; samples += SAMPLE_STEP)
+  {
+    tables.emplace_back(samples, coefficients);
+  }
+  return tables;
+}
+
+template <int Coefficients>
+bool describe(const cv::Mat& image, const Eigen::Vector2d& start, const Eigen::Vector2d& end, int samples,
+              const Basis& basis, double min_contrast, float* features)
+{
+  float intensities[MAX_SAMPLES];
+  float sums[Coefficients] = {};
+  const Eigen::Vector2f step = ((end - start) / samples).cast<float>();
+  const Eigen::Vector2f first = start.cast<float>() + 0.5F * step;
+  const unsigned char* data = image.data;
+  const std::size_t stride = image.step;
+  float total = 0.0F;
+  for (int i = 0; i < samples; ++i)
+  {
+    const float x = first.x() + static_cast<float>(i) * step.x();
+    const float y = first.y() + static_cast<float>(i) * step.y();
+    const int u = static_cast<int>(x);
+    const int v = static_cast<int>(y);
+    const float fx = x - static_cast<float>(u);
+    const float fy = y - static_cast<float>(v);
+    const unsigned char* p = data + static_cast<std::size_t>(v) * stride + u;
+    const float upper = static_cast<float>(p[0]) + fx * static_cast<float>(p[1] - p[0]);
+    const float lower = static_cast<float>(p[stride]) + fx * static_cast<float>(p[stride + 1] - p[stride]);
+    const float intensity = upper + fy * (lower - upper);
+    intensities[i] = intensity;
+    total += intensity;
+    const float* b = basis.row(i, Coefficients);
+    for (int c = 0; c < Coefficients; ++c)
+    {
+      sums[c] += intensity * b[c];
+    }
+  }
+  const float mean = total / static_cast<float>(samples);
+  float contrast = 0.0F;
+  for (int i = 0; i < samples; ++i)
+  {
+    contrast = std::max(contrast, std::abs(intensities[i] - mean));
+  }
+  if (static_cast<double>(contrast) < min_contrast)
+  {
+    return false;
+  }
+  for (int c = 0; c < Coefficients; ++c)
+  {
+    features[c] = (sums[c] - mean * basis.sum(c)) / contrast;
+  }
+  return true;
+}
+
+bool describe(const cv::Mat& image, const Eigen::Vector2d& start, const Eigen::Vector2d& end, int coefficients,
+              const std::vector<Basis>& tables, double min_contrast, float* features)
+{
+  const int samples = sampleCount((end - start).norm());
+  const Basis& basis = tables[static_cast<std::size_t>(samples / SAMPLE_STEP - 1)];
+  switch (coefficients)
+  {
+    case 4:
+      return describe<4>(image, start, end, samples, basis, min_contrast, features);
+    case 6:
+      return describe<6>(image, start, end, samples, basis, min_contrast, features);
+    default:
+      return describe<8>(image, start, end, samples, basis, min_contrast, features);
+  }
+}
+
+/** Bilinear sampling reads the pixel to the right and the one below. */
+bool inside(const cv::Mat& image, const Eigen::Vector2d& point)
+{
+  return point.x() >= 0.0 && point.y() >= 0.0 && point.x() < image.cols - 1.0 && point.y() < image.rows - 1.0;
+}
+
+void requireGrey(const cv::Mat& image)
+{
+  if (image.type() != CV_8UC1)
+  {
+    throw std::invalid_argument("intensity profiles need an 8-bit image with one channel");
+  }
+}
+
+/** Unordered pairs by the selection of the parameters, start < end, sorted. */
+std::vector<ProfileSet::Pair> selectPairs(const std::vector<Corner>& corners, const ProfileParams& params)
+{
+  const std::size_t n = corners.size();
+  std::vector<char> chosen(n * n, 0);
+  std::vector<std::pair<double, std::size_t>> near;
+  const double min_squared = params.min_length * params.min_length;
+  const double max_squared = params.selection == PairSelection::RADIUS ? params.max_length * params.max_length :
+                                                                         std::numeric_limits<double>::infinity();
+  for (std::size_t i = 0; i < n; ++i)
+  {
+    near.clear();
+    for (std::size_t j = 0; j < n; ++j)
+    {
+      const double squared = (corners[j].position - corners[i].position).squaredNorm();
+      if (squared >= min_squared && squared <= max_squared)
+      {
+        near.emplace_back(squared, j);
+      }
+    }
+    const std::size_t wanted = params.selection == PairSelection::NEAREST ?
+                                   std::min(near.size(), static_cast<std::size_t>(params.neighbours)) :
+                                   near.size();
+    if (wanted < near.size())
+    {
+      std::nth_element(near.begin(), near.begin() + static_cast<std::ptrdiff_t>(wanted), near.end());
+    }
+    for (std::size_t k = 0; k < wanted; ++k)
+    {
+      const std::size_t j = near[k].second;
+      chosen[std::min(i, j) * n + std::max(i, j)] = 1;
+    }
+  }
+  std::vector<ProfileSet::Pair> pairs;
+  for (std::size_t i = 0; i < n; ++i)
+  {
+    for (std::size_t j = i + 1; j < n; ++j)
+    {
+      if (chosen[i * n + j] != 0)
+      {
+        pairs.push_back({ static_cast<int>(i), static_cast<int>(j) });
+      }
+    }
+  }
+  return pairs;
+}
+
+/** Zero mean and unit deviation of every feature over the profiles read in both directions. */
+void normalize(ProfileSet& set)
+{
+  if (set.pairs.empty())
+  {
+    return;
+  }
+  const std::size_t columns = static_cast<std::size_t>(set.coefficients);
+  const double count = static_cast<double>(set.pairs.size());
+  for (std::size_t c = 0; c < columns; ++c)
+  {
+    double sum = 0.0;
+    double squares = 0.0;
+    for (std::size_t i = c; i < set.features.size(); i += columns)
+    {
+      const double value = static_cast<double>(set.features[i]);
+      sum += value;
+      squares += value * value;
+    }
+    const double mean = reversalSign(static_cast<int>(c)) < 0.0F ? 0.0 : sum / count;
+    const double variance = squares / count - mean * mean;
+    const double scale = variance > 1e-12 ? 1.0 / std::sqrt(variance) : 0.0;
+    for (std::size_t i = c; i < set.features.size(); i += columns)
+    {
+      set.features[i] = static_cast<float>((static_cast<double>(set.features[i]) - mean) * scale);
+    }
+  }
+}
+
+}  // namespace
+
+std::vector<std::string> ProfileParams::validate() const
+{
+  std::vector<std::string> faults;
+  const auto require = [&](bool good, const char* fault) {
+    if (!good)
+    {
+      faults.emplace_back(fault);
+    }
+  };
+  require(neighbours >= 1, "profile_neighbours must be at least 1");
+  require(min_length >= 2.0, "min_length must be at least 2 px");
+  require(max_length > min_length, "max_length must be larger than min_length");
+  require(coefficients == 4 || coefficients == 6 || coefficients == 8, "coefficients must be 4, 6 or 8");
+  require(min_contrast > 0.0 && min_contrast < 255.0, "min_contrast must lie in (0, 255) grey levels");
+  return faults;
+}
+
+ProfileSet extractProfiles(const cv::Mat& image, const std::vector<Corner>& corners, const ProfileParams& params)
+{
+  requireGrey(image);
+  ProfileSet set;
+  set.coefficients = params.coefficients;
+  const std::vector<ProfileSet::Pair> pairs = selectPairs(corners, params);
+  const std::size_t columns = static_cast<std::size_t>(params.coefficients);
+  std::vector<float> features(pairs.size() * columns);
+  std::vector<char> described(pairs.size(), 0);
+  const std::vector<Basis> tables = basisTables(params.coefficients);
+  cv::parallel_for_(cv::Range(0, static_cast<int>(pairs.size())), [&](const cv::Range& range) {
+    for (int i = range.start; i < range.end; ++i)
+    {
+      const std::size_t k = static_cast<std::size_t>(i);
+      const Eigen::Vector2d& start = corners[static_cast<std::size_t>(pairs[k].start)].position;
+      const Eigen::Vector2d& end = corners[static_cast<std::size_t>(pairs[k].end)].position;
+      described[k] = inside(image, start) && inside(image, end) &&
+                     describe(image, start, end, params.coefficients, tables, params.min_contrast,
+                              features.data() + k * columns);
+    }
+  });
+  for (std::size_t k = 0; k < pairs.size(); ++k)
+  {
+    if (described[k] != 0)
+    {
+      set.pairs.push_back(pairs[k]);
+      set.features.insert(set.features.end(), features.begin() + static_cast<std::ptrdiff_t>(k * columns),
+                          features.begin() + static_cast<std::ptrdiff_t>((k + 1) * columns));
+    }
+  }
+  normalize(set);
+  return set;
+}
+
+bool profileFeatures(const cv::Mat& image, const Eigen::Vector2d& start, const Eigen::Vector2d& end,
+                     const ProfileParams& params, float* features)
+{
+  requireGrey(image);
+  if (!inside(image, start) || !inside(image, end))
+  {
+    return false;
+  }
+  return describe(image, start, end, params.coefficients, basisTables(params.coefficients), params.min_contrast,
+                  features);
+}
+
+}  // namespace view_servo

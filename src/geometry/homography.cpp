@@ -1,0 +1,223 @@
+// Copyright (c) 2026, the view_servo authors
+// SPDX-License-Identifier: BSD-3-Clause
+#include "view_servo/geometry/homography.h"
+
+#include "levenberg_marquardt.h"
+#include "normalization.h"
+#include "residuals.h"
+
+#include <Eigen/Eigenvalues>
+#include <Eigen/Geometry>
+#include <Eigen/LU>
+
+#include <algorithm>
+#include <cmath>
+
+namespace view_servo
+{
+namespace
+{
+constexpr double INFINITE = std::numeric_limits<double>::infinity();
+
+/** Third coordinate of H x. */
+double thirdCoordinate(const Eigen::Matrix3d& h, const Eigen::Vector2d& p)
+{
+  return h(2, 0) * p.x() + h(2, 1) * p.y() + h(2, 2);
+}
+
+/** |H p - q|^2, or infinity. Written out: this is the inner loop of every homography RANSAC. */
+double squaredTransferError(const Eigen::Matrix3d& h, const Eigen::Vector2d& p, const Eigen::Vector2d& q)
+{
+  const double w = thirdCoordinate(h, p);
+  if (!(w > 0.0))
+  {
+    return INFINITE;
+  }
+  const double scale = 1.0 / w;
+  const double du = (h(0, 0) * p.x() + h(0, 1) * p.y() + h(0, 2)) * scale - q.x();
+  const double dv = (h(1, 0) * p.x() + h(1, 1) * p.y() + h(1, 2)) * scale - q.y();
+  return du * du + dv * dv;
+}
+
+/** Twice the signed area of a triangle over its longest side: its smallest height, signed by its orientation. */
+double signedHeight(const Eigen::Vector2d& a, const Eigen::Vector2d& b, const Eigen::Vector2d& c)
+{
+  const Eigen::Vector2d ab = b - a;
+  const Eigen::Vector2d ac = c - a;
+  const double longest = std::sqrt(std::max({ ab.squaredNorm(), ac.squaredNorm(), (c - b).squaredNorm() }));
+  return (ab.x() * ac.y() - ab.y() * ac.x()) / longest;  // NaN for three coincident points
+}
+
+/** Symmetric transfer error of a set of pairs as a function of the nine entries of H, whose norm is held at one. */
+class HomographyProblem
+{
+public:
+  using State = Eigen::Matrix3d;
+  static constexpr int DOF = 9;
+
+  HomographyProblem(Correspondences pairs, double huber_width) : pairs_(std::move(pairs)), huber_width_(huber_width)
+  {
+  }
+
+  double cost(const State& h) const
+  {
+    const Eigen::Matrix3d h_inverse = h.inverse();
+    double sum = 0.0;
+    for (const Correspondence& pair : pairs_)
+    {
+      sum += huberCost(symmetricTransferError(h, h_inverse, pair), huber_width_);
+    }
+    return sum;
+  }
+
+  void linearize(const State& h, Matrix9d& jtj, Vector9d& gradient) const
+  {
+    const Eigen::Matrix3d h_inverse = h.inverse();
+    Matrix9d lower = Matrix9d::Zero();
+    Eigen::Matrix3d gradient_matrix = Eigen::Matrix3d::Zero();
+    for (const Correspondence& pair : pairs_)
+    {
+      const TransferResidual forward = forwardResidual(h, pair);
+      const TransferResidual backward = backwardResidual(h_inverse, pair);
+      const double squared_error = forward.residual.squaredNorm() + backward.residual.squaredNorm();
+      const double weight = huberWeight(squared_error, huber_width_);
+      for (const TransferResidual* side : { &forward, &backward })
+      {
+        const Eigen::Matrix<double, 3, 2> weighted = weight * side->derivative.transpose();
+        addKronecker(weighted * side->derivative, side->point * side->point.transpose(), lower);
+        gradient_matrix += (weighted * side->residual) * side->point.transpose();
+      }
+    }
+    jtj = symmetric(lower);
+    gradient = rowMajor(gradient_matrix);
+    // No residual depends on the scale of H: hold it, so that the equations are regular.
+    const Vector9d scale_direction = rowMajor(h);
+    jtj += (jtj.trace() / DOF) * scale_direction * scale_direction.transpose();
+  }
+
+  State moved(const State& h, const Vector9d& step) const
+  {
+    return (h + matrixFromRows(step)).normalized();
+  }
+
+private:
+  Correspondences pairs_;
+  double huber_width_;
+};
+
+}  // namespace
+
+Eigen::Matrix3d normalizedHomography(const Eigen::Matrix3d& h)
+{
+  constexpr double NEARLY_ZERO = 1e-12;
+  const double norm = h.norm();
+  return std::abs(h(2, 2)) > NEARLY_ZERO * norm ? h / h(2, 2) : h / norm;
+}
+
+Eigen::Vector2d transfer(const Eigen::Matrix3d& h, const Eigen::Vector2d& point)
+{
+  const Eigen::Vector3d x = h * point.homogeneous();
+  if (!(x.z() > 0.0))
+  {
+    return Eigen::Vector2d::Constant(std::numeric_limits<double>::quiet_NaN());
+  }
+  return x.hnormalized();
+}
+
+double symmetricTransferError(const Eigen::Matrix3d& h, const Eigen::Matrix3d& h_inverse, const Correspondence& pair)
+{
+  const double error = squaredTransferError(h, pair.reference, pair.current) +
+                       squaredTransferError(h_inverse, pair.current, pair.reference);
+  return error < INFINITE ? error : INFINITE;  // NaN to infinity
+}
+
+bool isHomographySample(const Correspondences& four, double min_height)
+{
+  constexpr int TRIANGLES[4][3] = { { 0, 1, 2 }, { 0, 1, 3 }, { 0, 2, 3 }, { 1, 2, 3 } };
+  if (four.size() != 4)
+  {
+    return false;
+  }
+  return std::all_of(std::begin(TRIANGLES), std::end(TRIANGLES), [&](const auto& triangle) {
+    const Correspondence& a = four[triangle[0]];
+    const Correspondence& b = four[triangle[1]];
+    const Correspondence& c = four[triangle[2]];
+    const double reference = signedHeight(a.reference, b.reference, c.reference);
+    const double current = signedHeight(a.current, b.current, c.current);
+    return std::abs(reference) >= min_height && std::abs(current) >= min_height && reference * current > 0.0;
+  });
+}
+
+std::optional<Eigen::Matrix3d> homographyFromPoints(const Correspondences& pairs)
+{
+  // On eigenvalues of A^T A, that is squared singular values, relative to the largest.
+  constexpr double RANK_TOLERANCE = 1e-12;
+  if (pairs.size() < 4)
+  {
+    return std::nullopt;
+  }
+  const auto normalization = isotropicNormalization(pairs);
+  if (!normalization)
+  {
+    return std::nullopt;
+  }
+  // The rows (x^T, 0, -u' x^T) and (0, x^T, -v' x^T) of a pair add M (x) x x^T to A^T A.
+  Matrix9d ata = Matrix9d::Zero();
+  for (const Correspondence& pair : pairs)
+  {
+    const auto [reference, current] = (*normalization)(pair);
+    Eigen::Matrix3d m;
+    m << 1.0, 0.0, -current.x(), 0.0, 1.0, -current.y(), -current.x(), -current.y(), current.squaredNorm();
+    const Eigen::Vector3d x = reference.homogeneous();
+    addKronecker(m, x * x.transpose(), ata);
+  }
+  const Eigen::SelfAdjointEigenSolver<Matrix9d> eigen(ata);
+  if (eigen.info() != Eigen::Success || !(eigen.eigenvalues()(1) > RANK_TOLERANCE * eigen.eigenvalues()(8)))
+  {
+    return std::nullopt;
+  }
+  const Eigen::Matrix3d normalized = matrixFromRows(eigen.eigenvectors().col(0));
+  if (!(std::abs(normalized.determinant()) > RANK_TOLERANCE))
+  {
+    return std::nullopt;
+  }
+  Eigen::Matrix3d h =
+      (normalization->current.inverseMatrix() * normalized * normalization->reference.matrix()).normalized();
+  if (thirdCoordinate(h, pairs.front().reference) < 0.0)
+  {
+    h = -h;
+  }
+  const Eigen::Matrix3d h_inverse = h.inverse();
+  const bool in_view = std::all_of(pairs.begin(), pairs.end(), [&](const Correspondence& pair) {
+    return std::isfinite(symmetricTransferError(h, h_inverse, pair));
+  });
+  return in_view ? std::make_optional(h) : std::nullopt;
+}
+
+Eigen::Matrix3d refineHomography(const Eigen::Matrix3d& initial, const Correspondences& pairs, double huber_width,
+                                 int max_iterations)
+{
+  // A pair that maps beyond infinity has no gradient to follow; such pairs are left out.
+  const Eigen::Matrix3d initial_inverse = initial.inverse();
+  Correspondences usable;
+  usable.reserve(pairs.size());
+  std::copy_if(pairs.begin(), pairs.end(), std::back_inserter(usable), [&](const Correspondence& pair) {
+    return std::isfinite(symmetricTransferError(initial, initial_inverse, pair));
+  });
+  const auto normalization = commonNormalization(usable);
+  if (usable.size() < 4 || !normalization)
+  {
+    return initial;
+  }
+  std::transform(usable.begin(), usable.end(), usable.begin(), *normalization);
+  const HomographyProblem problem(std::move(usable), huber_width * normalization->current.scale);
+  Eigen::Matrix3d h =
+      (normalization->current.matrix() * initial * normalization->reference.inverseMatrix()).normalized();
+  if (!levenbergMarquardt(problem, h, max_iterations))
+  {
+    return initial;
+  }
+  return (normalization->current.inverseMatrix() * h * normalization->reference.matrix()).normalized();
+}
+
+}  // namespace view_servo

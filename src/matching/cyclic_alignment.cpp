@@ -1,0 +1,126 @@
+// Copyright (c) 2026, the view_servo authors
+// SPDX-License-Identifier: BSD-3-Clause
+#include "view_servo/matching/cyclic_alignment.h"
+
+#include <algorithm>
+#include <limits>
+
+namespace view_servo
+{
+namespace
+{
+constexpr float UNREACHABLE = -std::numeric_limits<float>::infinity();
+}
+
+float CyclicAligner::align(const float* weights, int rows, int columns)
+{
+  if (rows <= 0 || columns <= 0)
+  {
+    return 0.0F;
+  }
+  weights_ = weights;
+  rows_ = rows;
+  columns_ = columns;
+  best_ = 0.0F;
+  table_.resize(static_cast<std::size_t>(rows + 1) * static_cast<std::size_t>(2 * columns + 1));
+  std::size_t levels = 3;
+  for (int n = columns; n > 1; n = (n + 1) / 2)
+  {
+    ++levels;
+  }
+  paths_.resize(std::max(paths_.size(), levels));
+
+  // The columns are written twice side by side; rotation k runs from (0, k) to (rows, k + columns). Rotation `columns`
+  // is rotation 0 again, moved by one period.
+  alignRotation(0, nullptr, nullptr, paths_[0]);
+  paths_[1] = paths_[0];
+  for (std::size_t row = 0; row <= static_cast<std::size_t>(rows); ++row)
+  {
+    paths_[1].first[row] += columns;
+    paths_[1].last[row] += columns;
+  }
+  stack_size_ = 2;
+  divide(0, columns, 0, 1);
+  return best_;
+}
+
+void CyclicAligner::divide(int left_rotation, int right_rotation, std::size_t left, std::size_t right)
+{
+  const int middle_rotation = (left_rotation + right_rotation) / 2;
+  if (middle_rotation == left_rotation)
+  {
+    return;
+  }
+  const std::size_t middle = stack_size_++;
+  alignRotation(middle_rotation, &paths_[left], &paths_[right], paths_[middle]);
+  divide(left_rotation, middle_rotation, left, middle);
+  divide(middle_rotation, right_rotation, middle, right);
+  --stack_size_;
+}
+
+void CyclicAligner::alignRotation(int rotation, const Path* left, const Path* right, Path& path)
+{
+  const std::size_t stride = static_cast<std::size_t>(2 * columns_ + 1);
+  const auto low = [&](int row) {
+    return left == nullptr ? rotation : std::max(rotation, left->first[static_cast<std::size_t>(row)]);
+  };
+  const auto high = [&](int row) {
+    const int end = rotation + columns_;
+    return right == nullptr ? end : std::min(end, right->last[static_cast<std::size_t>(row)]);
+  };
+
+  // Cell (i, j): best weight of the first i rows against columns rotation .. j - 1; each row only within its band.
+  std::fill(table_.begin() + low(0), table_.begin() + high(0) + 1, 0.0F);
+  int previous_low = low(0);
+  int previous_high = high(0);
+  for (int i = 1; i <= rows_; ++i)
+  {
+    const float* above = table_.data() + static_cast<std::size_t>(i - 1) * stride;
+    float* here = table_.data() + static_cast<std::size_t>(i) * stride;
+    const float* weight = weights_ + static_cast<std::size_t>(i - 1) * static_cast<std::size_t>(columns_);
+    const int first = low(i);
+    const int last = high(i);
+    float running = UNREACHABLE;
+    for (int j = first; j <= last; ++j)
+    {
+      if (j >= previous_low && j <= previous_high)
+      {
+        running = std::max(running, above[j]);
+      }
+      if (j - 1 >= previous_low && j - 1 <= previous_high)
+      {
+        const int column = j - 1 < columns_ ? j - 1 : j - 1 - columns_;
+        running = std::max(running, above[j - 1] + weight[column]);
+      }
+      here[j] = running;
+    }
+    previous_low = first;
+    previous_high = last;
+  }
+
+  // Back from the end; among equal ways any is optimal.
+  path.first.resize(static_cast<std::size_t>(rows_) + 1);
+  path.last.resize(static_cast<std::size_t>(rows_) + 1);
+  int j = rotation + columns_;
+  best_ = std::max(best_, table_[static_cast<std::size_t>(rows_) * stride + static_cast<std::size_t>(j)]);
+  for (int i = rows_; i > 0; --i)
+  {
+    const float* above = table_.data() + static_cast<std::size_t>(i - 1) * stride;
+    const float* here = table_.data() + static_cast<std::size_t>(i) * stride;
+    const int first = low(i);
+    path.last[static_cast<std::size_t>(i)] = j;
+    while (j > first && here[j - 1] == here[j])
+    {
+      --j;
+    }
+    path.first[static_cast<std::size_t>(i)] = j;
+    if (j < low(i - 1) || j > high(i - 1) || above[j] != here[j])
+    {
+      --j;  // the diagonal: row i - 1 is paired with column j - 1
+    }
+  }
+  path.last[0] = j;
+  path.first[0] = rotation;
+}
+
+}  // namespace view_servo

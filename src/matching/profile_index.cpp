@@ -1,0 +1,251 @@
+// Copyright (c) 2026, the view_servo authors
+// SPDX-License-Identifier: BSD-3-Clause
+#include "view_servo/matching/profile_index.h"
+
+#include <opencv2/core.hpp>
+
+#include <Eigen/Core>
+#include <nanoflann.hpp>
+
+#include <algorithm>
+#include <stdexcept>
+#include <utility>
+
+namespace view_servo
+{
+namespace
+{
+// A profile and its reverse differ in the sign of some features. The current profile is searched in the direction in
+// which this one, the strongest of them (cos 1), is >= 0, ...
+constexpr int DIRECTING_FEATURE = 1;
+// ... and the tree holds each reference profile in the directions in which it is at least minus this. [deviations]
+constexpr float DIRECTION_MARGIN = 0.5F;
+constexpr std::size_t LEAF_SIZE = 32;
+
+#if NANOFLANN_VERSION >= 0x150
+using SearchParams = nanoflann::SearchParameters;
+SearchParams searchParams(float epsilon)
+{
+  return SearchParams(epsilon, true);
+}
+#else
+using SearchParams = nanoflann::SearchParams;
+SearchParams searchParams(float epsilon)
+{
+  return SearchParams(32, epsilon, true);
+}
+#endif
+
+/** Vectors of the tree, in the layout that nanoflann asks for. */
+struct Cloud
+{
+  std::size_t columns = 0;
+  std::vector<float> values;
+  std::vector<ProfileMatch> source;
+
+  std::size_t kdtree_get_point_count() const  // NOLINT(readability-identifier-naming): nanoflann's name
+  {
+    return source.size();
+  }
+  float kdtree_get_pt(std::size_t i, std::size_t column) const  // NOLINT(readability-identifier-naming)
+  {
+    return values[i * columns + column];
+  }
+  template <class Box>
+  bool kdtree_get_bbox(Box& /*box*/) const  // NOLINT(readability-identifier-naming)
+  {
+    return false;
+  }
+};
+
+/** Squared distance for nanoflann, with the number of columns known to the compiler so that it uses SIMD. */
+template <int Columns>
+struct SquaredDistance
+{
+  using ElementType = float;
+  using DistanceType = float;
+  using Vector = Eigen::Map<const Eigen::Matrix<float, Columns, 1>>;
+
+  explicit SquaredDistance(const Cloud& vectors) : cloud(vectors)
+  {
+  }
+  float evalMetric(const float* query, std::size_t i, std::size_t /*columns*/) const
+  {
+    return (Vector(query) - Vector(cloud.values.data() + i * static_cast<std::size_t>(Columns))).squaredNorm();
+  }
+  template <typename A, typename B>
+  float accum_dist(A a, B b, std::size_t /*column*/) const  // NOLINT(readability-identifier-naming)
+  {
+    return (a - b) * (a - b);
+  }
+
+  const Cloud& cloud;
+};
+
+template <int Columns>
+using KdTree = nanoflann::KDTreeSingleIndexAdaptor<SquaredDistance<Columns>, Cloud, Columns, std::uint32_t>;
+
+void reverse(const float* feature, std::size_t columns, float* reversed)
+{
+  for (std::size_t c = 0; c < columns; ++c)
+  {
+    reversed[c] = feature[c] * reversalSign(static_cast<int>(c));
+  }
+}
+
+}  // namespace
+
+std::vector<std::string> ProfileSearchParams::validate() const
+{
+  std::vector<std::string> faults;
+  if (neighbours < 1 || neighbours > 1000)
+  {
+    faults.emplace_back("search_neighbours must lie in [1, 1000]");
+  }
+  if (!(radius > 0.0))
+  {
+    faults.emplace_back("search_radius must be positive");
+  }
+  if (!(epsilon >= 0.0))
+  {
+    faults.emplace_back("search_epsilon must be at least 0");
+  }
+  return faults;
+}
+
+struct ProfileIndex::Tree
+{
+  Cloud cloud;
+  std::unique_ptr<KdTree<4>> tree4;
+  std::unique_ptr<KdTree<6>> tree6;
+  std::unique_ptr<KdTree<8>> tree8;
+
+  template <int Columns>
+  void build(std::unique_ptr<KdTree<Columns>>& tree)
+  {
+    tree = std::make_unique<KdTree<Columns>>(Columns, cloud, nanoflann::KDTreeSingleIndexAdaptorParams(LEAF_SIZE));
+    tree->buildIndex();
+  }
+
+  /** Appends what is similar to a directed profile: [begin, end) of the cloud's vectors. */
+  template <int Columns>
+  void search(const KdTree<Columns>& tree, const float* query, const ProfileSearchParams& params,
+              std::vector<std::pair<std::uint32_t, float>>& found) const
+  {
+    found.clear();
+    if (params.search == ProfileSearch::RADIUS)
+    {
+      const float radius = static_cast<float>(params.radius);
+      tree.radiusSearch(query, radius * radius, found, searchParams(0.0F));
+      return;
+    }
+    const std::size_t wanted = static_cast<std::size_t>(params.neighbours);
+    std::uint32_t indices[1000];
+    float distances[1000];
+    nanoflann::KNNResultSet<float, std::uint32_t> result(wanted);
+    result.init(indices, distances);
+    tree.findNeighbors(result, query, searchParams(static_cast<float>(params.epsilon)));
+    for (std::size_t i = 0; i < result.size(); ++i)
+    {
+      found.emplace_back(indices[i], distances[i]);
+    }
+  }
+
+  void search(const float* query, const ProfileSearchParams& params,
+              std::vector<std::pair<std::uint32_t, float>>& found) const
+  {
+    switch (cloud.columns)
+    {
+      case 4:
+        search(*tree4, query, params, found);
+        break;
+      case 6:
+        search(*tree6, query, params, found);
+        break;
+      default:
+        search(*tree8, query, params, found);
+        break;
+    }
+  }
+};
+
+ProfileIndex::ProfileIndex(const ProfileSet& profiles) : tree_(std::make_unique<Tree>())
+{
+  Cloud& cloud = tree_->cloud;
+  cloud.columns = static_cast<std::size_t>(profiles.coefficients);
+  if (cloud.columns != 4 && cloud.columns != 6 && cloud.columns != 8)
+  {
+    throw std::invalid_argument("ProfileIndex: profiles must have 4, 6 or 8 features");
+  }
+  std::vector<float> reversed(cloud.columns);
+  for (std::size_t i = 0; i < profiles.pairs.size(); ++i)
+  {
+    const float* feature = profiles.feature(i);
+    reverse(feature, cloud.columns, reversed.data());
+    for (const float* directed : { feature, static_cast<const float*>(reversed.data()) })
+    {
+      if (directed[DIRECTING_FEATURE] >= -DIRECTION_MARGIN)
+      {
+        cloud.values.insert(cloud.values.end(), directed, directed + cloud.columns);
+        cloud.source.push_back({ static_cast<int>(i), directed != feature });
+      }
+    }
+  }
+  switch (cloud.columns)
+  {
+    case 4:
+      tree_->build(tree_->tree4);
+      break;
+    case 6:
+      tree_->build(tree_->tree6);
+      break;
+    default:
+      tree_->build(tree_->tree8);
+      break;
+  }
+}
+
+ProfileIndex::~ProfileIndex() = default;
+ProfileIndex::ProfileIndex(ProfileIndex&&) noexcept = default;
+ProfileIndex& ProfileIndex::operator=(ProfileIndex&&) noexcept = default;
+
+std::vector<std::vector<ProfileMatch>> ProfileIndex::search(const ProfileSet& current,
+                                                            const ProfileSearchParams& params) const
+{
+  const Cloud& cloud = tree_->cloud;
+  if (static_cast<std::size_t>(current.coefficients) != cloud.columns)
+  {
+    throw std::invalid_argument("ProfileIndex: the two images' profiles differ in their number of features");
+  }
+  std::vector<std::vector<ProfileMatch>> matches(current.pairs.size());
+  if (cloud.source.empty())
+  {
+    return matches;
+  }
+  cv::parallel_for_(cv::Range(0, static_cast<int>(current.pairs.size())), [&](const cv::Range& range) {
+    std::vector<std::pair<std::uint32_t, float>> found;
+    std::vector<float> reversed(cloud.columns);
+    for (int i = range.start; i < range.end; ++i)
+    {
+      const float* query = current.feature(static_cast<std::size_t>(i));
+      const bool turned = query[DIRECTING_FEATURE] < 0.0F;
+      if (turned)
+      {
+        reverse(query, cloud.columns, reversed.data());
+        query = reversed.data();
+      }
+      tree_->search(query, params, found);
+      std::vector<ProfileMatch>& out = matches[static_cast<std::size_t>(i)];
+      out.reserve(found.size());
+      for (const auto& [index, distance] : found)
+      {
+        ProfileMatch match = cloud.source[index];
+        match.reversed = match.reversed != turned;
+        out.push_back(match);
+      }
+    }
+  });
+  return matches;
+}
+
+}  // namespace view_servo

@@ -1,0 +1,205 @@
+// Copyright (c) 2026, the view_servo authors
+// SPDX-License-Identifier: BSD-3-Clause
+#include "view_servo/views/view_store.h"
+
+#include "view_servo/DeleteView.h"
+#include "view_servo/GetView.h"
+#include "view_servo/ListViews.h"
+#include "view_servo/SaveView.h"
+#include "view_servo/ros/camera_input.h"
+#include "view_servo/ros/conversions.h"
+#include "view_servo/ros/image_source.h"
+#include "view_servo/ros/node_base.h"
+#include "view_servo/ros/parameters.h"
+
+#include <sensor_msgs/image_encodings.h>
+#include <tf2_ros/buffer.h>
+#include <tf2_ros/transform_listener.h>
+
+#include <mutex>
+#include <optional>
+#include <string>
+
+namespace view_servo
+{
+namespace
+{
+struct ViewStoreNodeParams
+{
+  CameraInputParams camera;
+  ImageSourceParams sources;
+  std::string fixed_frame = "odom";
+
+  /** @throws std::invalid_argument listing all faults. */
+  static ViewStoreNodeParams read(const ros::NodeHandle& private_nh)
+  {
+    ViewStoreNodeParams params;
+    ParameterReader reader(private_nh);
+    params.camera = CameraInputParams::read(reader);
+    params.sources = ImageSourceParams::read(reader);
+    reader.read("fixed_frame", params.fixed_frame);
+    reader.finish();
+    return params;
+  }
+};
+
+}  // namespace
+
+/**
+ * Keeps stored views on disk: an image, with the camera's calibration, the region of interest, stamp, frame and pose.
+ *
+ * Parameters, all private:
+ *  - `~fixed_frame` (string, default "odom"): the camera's pose is stored in this frame, where tf knows it; "" = never;
+ *  - `~views_dir`, `~allow_paths`: see ImageSourceReader;
+ *  - `~image_transport`, `~queue_size`, `~max_image_age`: see CameraInput.
+ *
+ * Subscribes:
+ *  - `image_raw` (sensor_msgs/Image), `camera_info` (sensor_msgs/CameraInfo), `/tf`, `/tf_static`.
+ *
+ * Publishes:
+ *  - `/diagnostics` (diagnostic_msgs/DiagnosticArray): 1 Hz, camera.
+ *
+ * Services:
+ *  - `~save` (view_servo/SaveView): stores a view;
+ *  - `~list` (view_servo/ListViews): names the readable views and the damaged ones;
+ *  - `~delete` (view_servo/DeleteView), `~get` (view_servo/GetView).
+ *
+ * Other nodes read views from the directory themselves, not through this node: they go on without it, and see a view
+ * as soon as it is saved because the store is safe for several processes as long as one of them writes.
+ */
+class ViewStoreNode : private NodeBase
+{
+public:
+  ViewStoreNode(const ros::NodeHandle& nh, const ros::NodeHandle& private_nh)
+    : NodeBase(nh, private_nh)
+    , params_(ViewStoreNodeParams::read(private_nh))
+    , tf_listener_(tf_buffer_)
+    , camera_(nh, params_.camera)
+    , sources_(params_.sources, camera_)
+    , store_(sources_.store())
+  {
+    save_service_ = private_nh_.advertiseService("save", &ViewStoreNode::save, this);
+    list_service_ = private_nh_.advertiseService("list", &ViewStoreNode::list, this);
+    delete_service_ = private_nh_.advertiseService("delete", &ViewStoreNode::remove, this);
+    get_service_ = private_nh_.advertiseService("get", &ViewStoreNode::get, this);
+    diagnostics_.add("camera", &camera_, &CameraInput::diagnose);
+    ROS_INFO_STREAM("stored views are in " << store_.directory());
+  }
+
+private:
+  bool save(SaveView::Request& request, SaveView::Response& response)
+  {
+    return answer(response, [&] {
+      const SourcedImage source = sources_.read(request.source, "source");
+      StoredView view;
+      view.name = request.name;
+      view.image = source.grey;
+      const cv::Rect region = toRect(request.roi, source.grey.size());
+      view.region = region.empty() ? source.region : region;
+      view.camera = source.camera;
+      view.stamp = source.header.stamp.toSec();
+      view.frame_id = source.header.frame_id;
+      view.pose = source.pose ? source.pose : lookUpPose(source.header);
+      {
+        const std::lock_guard<std::mutex> lock(write_mutex_);
+        store_.save(view, request.overwrite);
+      }
+      response.success = true;
+      response.message = "saved view '" + view.name + "', " + std::to_string(view.image.cols) + " x " +
+                         std::to_string(view.image.rows) + (view.camera ? "" : ", without a calibration") +
+                         (view.pose ? ", with its pose in " + view.pose->frame : ", without a pose");
+      ROS_INFO_STREAM(response.message);
+    });
+  }
+
+  bool list(ListViews::Request& /*request*/, ListViews::Response& response)
+  {
+    return answer(response, [&] {
+      const ViewStore::Listing listing = store_.list();
+      response.names = listing.names;
+      for (const ViewStore::Damaged& damaged : listing.damaged)
+      {
+        DamagedView message;
+        message.name = damaged.name;
+        message.reason = damaged.reason;
+        response.damaged.push_back(message);
+      }
+      response.success = true;
+      response.message = std::to_string(listing.names.size()) + " views and " +
+                         std::to_string(listing.damaged.size()) + " damaged ones in " + store_.directory().string();
+    });
+  }
+
+  bool remove(DeleteView::Request& request, DeleteView::Response& response)
+  {
+    return answer(response, [&] {
+      {
+        const std::lock_guard<std::mutex> lock(write_mutex_);
+        store_.remove(request.name);
+      }
+      response.success = true;
+      response.message = "deleted view '" + request.name + "'";
+      ROS_INFO_STREAM(response.message);
+    });
+  }
+
+  bool get(GetView::Request& request, GetView::Response& response)
+  {
+    return answer(response, [&] {
+      const StoredView view = store_.load(request.name);
+      std_msgs::Header header;
+      header.stamp.fromSec(view.stamp);
+      header.frame_id = view.frame_id;
+      response.image = toImage(view.image, sensor_msgs::image_encodings::MONO8, header);
+      response.camera_info = toCameraInfo(view.camera.value_or(Camera()), header);
+      response.roi = toRegionOfInterest(view.region);
+      response.has_pose = view.pose.has_value();
+      if (view.pose)
+      {
+        response.pose = toPoseStamped(*view.pose, header.stamp);
+      }
+      response.success = true;
+    });
+  }
+
+  /** The pose of an image's frame when the image was taken, where tf knows it or learns it within a moment. */
+  std::optional<ViewPose> lookUpPose(const std_msgs::Header& header) const
+  {
+    if (header.frame_id.empty() || params_.fixed_frame.empty())
+    {
+      return std::nullopt;
+    }
+    // tf2's own timeout is on ROS time and does not end while that stands still.
+    const ros::WallTime deadline = ros::WallTime::now() + ros::WallDuration(0.25);
+    while (!tf_buffer_.canTransform(params_.fixed_frame, header.frame_id, header.stamp))
+    {
+      if (ros::WallTime::now() > deadline)
+      {
+        ROS_INFO_STREAM("tf does not know the pose of '" << header.frame_id << "' in '" << params_.fixed_frame
+                                                         << "' at " << header.stamp);
+        return std::nullopt;
+      }
+      ros::WallDuration(0.01).sleep();
+    }
+    return toViewPose(tf_buffer_.lookupTransform(params_.fixed_frame, header.frame_id, header.stamp));
+  }
+
+  const ViewStoreNodeParams params_;
+  tf2_ros::Buffer tf_buffer_;
+  tf2_ros::TransformListener tf_listener_;
+  CameraInput camera_;
+  ImageSourceReader sources_;
+  const ViewStore& store_;
+  std::mutex write_mutex_;  // one writer at a time
+  ros::ServiceServer save_service_;
+  ros::ServiceServer list_service_;
+  ros::ServiceServer delete_service_;
+  ros::ServiceServer get_service_;
+};
+
+}  // namespace view_servo
+
+int main(int argc, char** argv)
+{
+  return view_servo::runNode<view_servo::ViewStoreNode>(argc, argv, "view_store");
+}

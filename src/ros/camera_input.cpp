@@ -1,0 +1,163 @@
+// Copyright (c) 2026, the view_servo authors
+// SPDX-License-Identifier: BSD-3-Clause
+#include "view_servo/ros/camera_input.h"
+
+#include "view_servo/ros/conversions.h"
+#include "view_servo/views/image_io.h"
+
+#include <ros/console.h>
+#include <ros/time.h>
+
+#include <cmath>
+#include <cstdint>
+#include <sstream>
+#include <utility>
+
+namespace view_servo
+{
+namespace
+{
+constexpr double CHECK_PERIOD = 5.0;   // [s]
+constexpr double ERROR_PERIOD = 10.0;  // [s]
+
+std::string seconds(double value)
+{
+  std::ostringstream text;
+  text.precision(3);
+  text << value << " s";
+  return text.str();
+}
+
+}  // namespace
+
+CameraInputParams CameraInputParams::read(ParameterReader& reader)
+{
+  CameraInputParams params;
+  reader.expect("image_transport");
+  reader.read("queue_size", params.queue_size);
+  reader.require(params.queue_size >= 1, "~queue_size must be at least 1");
+  reader.read("max_image_age", params.max_image_age);
+  reader.require(params.max_image_age > 0.0, "~max_image_age must be positive [s]");
+  return params;
+}
+
+CameraInput::CameraInput(const ros::NodeHandle& nh, const CameraInputParams& params, Callback on_frame)
+  : params_(params)
+  , on_frame_(std::move(on_frame))
+  , last_diagnosis_(ros::WallTime::now())
+  , transport_(nh)
+  , synchronizer_(static_cast<std::uint32_t>(params.queue_size))
+{
+  const auto queue_size = static_cast<std::uint32_t>(params.queue_size);
+  ros::NodeHandle topics_nh(nh);
+  synchronizer_.connectInput(image_subscriber_, info_subscriber_);
+  synchronizer_.registerCallback(&CameraInput::frameCallback, this);
+  image_subscriber_.registerCallback([this](const sensor_msgs::ImageConstPtr&) {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    ++images_;
+  });
+  info_subscriber_.registerCallback([this](const sensor_msgs::CameraInfoConstPtr&) {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    ++infos_;
+  });
+  image_subscriber_.subscribe(transport_, "image_raw", queue_size, image_transport::TransportHints());
+  info_subscriber_.subscribe(topics_nh, "camera_info", queue_size);
+  check_timer_ =
+      topics_nh.createWallTimer(ros::WallDuration(CHECK_PERIOD), [this](const ros::WallTimerEvent&) { checkInputs(); });
+}
+
+CameraFrame CameraInput::latest() const
+{
+  const std::lock_guard<std::mutex> lock(mutex_);
+  if (!latest_.image)
+  {
+    throw ImageError("no image from the camera: " + (problem_.empty() ? "none came on " + topics() : problem_));
+  }
+  const double age = (ros::Time::now() - latest_.image->header.stamp).toSec();
+  if (std::abs(age) > params_.max_image_age)
+  {
+    throw ImageError("the latest camera image on '" + image_subscriber_.getTopic() + "' is " +
+                     (age > 0.0 ? seconds(age) + " old" : "stamped " + seconds(-age) + " in the future") +
+                     ", ~max_image_age is " + seconds(params_.max_image_age));
+  }
+  return latest_;
+}
+
+void CameraInput::diagnose(diagnostic_updater::DiagnosticStatusWrapper& status)
+{
+  const std::lock_guard<std::mutex> lock(mutex_);
+  const ros::WallTime now = ros::WallTime::now();
+  const double period = (now - last_diagnosis_).toSec();
+  rate_ = period > 0.0 ? frames_ / period : 0.0;
+  frames_ = 0;
+  last_diagnosis_ = now;
+
+  if (!problem_.empty())
+  {
+    status.summary(diagnostic_msgs::DiagnosticStatus::ERROR, problem_);
+  }
+  else if (rate_ > 0.0)
+  {
+    status.summary(diagnostic_msgs::DiagnosticStatus::OK, "images arrive");
+  }
+  else
+  {
+    status.summary(diagnostic_msgs::DiagnosticStatus::WARN, "no image in the last " + seconds(period));
+  }
+  status.add("Image topic", image_subscriber_.getTopic());
+  status.add("Camera info topic", info_subscriber_.getTopic());
+  status.add("Rate [Hz]", rate_);
+}
+
+void CameraInput::frameCallback(const sensor_msgs::ImageConstPtr& image, const sensor_msgs::CameraInfoConstPtr& info)
+{
+  std::string problem;
+  if (!isCalibrated(*info))
+  {
+    problem = "the camera is not calibrated: K is all zero in " + topics();
+  }
+  else
+  {
+    const Camera camera = toCamera(*info);
+    if (camera.width != static_cast<int>(image->width) || camera.height != static_cast<int>(image->height))
+    {
+      problem = "the calibration is for " + std::to_string(camera.width) + " x " + std::to_string(camera.height) +
+                " pixels and the image has " + std::to_string(image->width) + " x " + std::to_string(image->height) +
+                ", in " + topics();
+    }
+  }
+  {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    ++pairs_;
+    problem_ = problem;
+    latest_ = problem.empty() ? CameraFrame{ image, info } : CameraFrame{};
+    frames_ += problem.empty() ? 1 : 0;
+  }
+  if (!problem.empty())
+  {
+    ROS_ERROR_STREAM_THROTTLE(ERROR_PERIOD, problem << "; its images are not used");
+  }
+  else if (on_frame_)
+  {
+    on_frame_({ image, info });
+  }
+}
+
+void CameraInput::checkInputs()
+{
+  const std::lock_guard<std::mutex> lock(mutex_);
+  if (pairs_ == 0 && images_ + infos_ > 0)
+  {
+    problem_ = "no image and camera_info with the same stamp: " + std::to_string(images_) + " and " +
+               std::to_string(infos_) + " messages in " + seconds(CHECK_PERIOD) + " on " + topics();
+    ROS_ERROR_STREAM(problem_);
+  }
+  images_ = infos_ = pairs_ = 0;
+}
+
+std::string CameraInput::topics() const
+{
+  return "'" + image_subscriber_.getTopic() + "' and '" + info_subscriber_.getTopic() + "'";
+}
+
+}  // namespace view_servo

@@ -1,0 +1,206 @@
+// Copyright (c) 2026, the view_servo authors
+// SPDX-License-Identifier: BSD-3-Clause
+#include "view_servo/ros/conversions.h"
+
+#include "view_servo/views/image_io.h"
+
+#include <cv_bridge/cv_bridge.h>
+#include <image_geometry/pinhole_camera_model.h>
+#include <sensor_msgs/image_encodings.h>
+
+#include <algorithm>
+#include <cstdint>
+#include <limits>
+
+namespace view_servo
+{
+namespace
+{
+constexpr double NOT_A_NUMBER = std::numeric_limits<double>::quiet_NaN();
+
+geometry_msgs::Vector3 unknownVector()
+{
+  geometry_msgs::Vector3 vector;
+  vector.x = vector.y = vector.z = NOT_A_NUMBER;
+  return vector;
+}
+
+geometry_msgs::Quaternion unknownRotation()
+{
+  geometry_msgs::Quaternion rotation;
+  rotation.x = rotation.y = rotation.z = rotation.w = NOT_A_NUMBER;
+  return rotation;
+}
+
+/** Encodings whose channels are not in the order the core reads: they have to pass through cv_bridge. */
+bool needsReordering(const std::string& encoding)
+{
+  namespace enc = sensor_msgs::image_encodings;
+  return enc::isBayer(encoding) || encoding == enc::RGB8 || encoding == enc::RGBA8 || encoding == enc::RGB16 ||
+         encoding == enc::RGBA16 || encoding == enc::YUV422;
+}
+
+}  // namespace
+
+bool isCalibrated(const sensor_msgs::CameraInfo& info)
+{
+  return info.K[0] > 0.0 && info.K[4] > 0.0;
+}
+
+Camera toCamera(const sensor_msgs::CameraInfo& info)
+{
+  image_geometry::PinholeCameraModel model;
+  model.fromCameraInfo(info);
+
+  Camera camera;
+  camera.width = model.reducedResolution().width;
+  camera.height = model.reducedResolution().height;
+  camera.distortion_model = info.distortion_model;
+  camera.distortion = info.D;
+  camera.k = Eigen::Map<const Eigen::Matrix<double, 3, 3, Eigen::RowMajor>>(model.intrinsicMatrix().val);
+  camera.rectification = Eigen::Map<const Eigen::Matrix<double, 3, 3, Eigen::RowMajor>>(model.rotationMatrix().val);
+  camera.projection = Eigen::Map<const Eigen::Matrix<double, 3, 4, Eigen::RowMajor>>(model.projectionMatrix().val);
+  return camera;
+}
+
+sensor_msgs::CameraInfo toCameraInfo(const Camera& camera, const std_msgs::Header& header)
+{
+  sensor_msgs::CameraInfo info;
+  info.header = header;
+  info.width = static_cast<std::uint32_t>(camera.width);
+  info.height = static_cast<std::uint32_t>(camera.height);
+  info.distortion_model = camera.distortion_model;
+  info.D = camera.distortion;
+  copyRowMajor(camera.k, info.K);
+  copyRowMajor(camera.rectification, info.R);
+  Eigen::Map<Eigen::Matrix<double, 3, 4, Eigen::RowMajor>>(info.P.data()) = camera.projection;
+  return info;
+}
+
+cv::Mat toGrey(const sensor_msgs::Image& image, const std::string& name)
+{
+  if (static_cast<std::uint64_t>(image.width) * image.height > static_cast<std::uint64_t>(MAX_IMAGE_PIXELS))
+  {
+    throw ImageError("'" + name + "': " + std::to_string(image.width) + " x " + std::to_string(image.height) +
+                     " pixels are too many, the limit is " + std::to_string(MAX_IMAGE_PIXELS));
+  }
+  // cv_bridge compares in 32 bits, where the product may wrap.
+  if (static_cast<std::uint64_t>(image.step) * image.height != image.data.size())
+  {
+    throw ImageError("'" + name + "': " + std::to_string(image.data.size()) + " bytes are not " +
+                     std::to_string(image.height) + " rows of " + std::to_string(image.step));
+  }
+  try
+  {
+    const boost::shared_ptr<const void> outlives_this_call;
+    const cv_bridge::CvImageConstPtr shared = cv_bridge::toCvShare(image, outlives_this_call);
+    if (needsReordering(image.encoding))
+    {
+      return toGrey(cv_bridge::cvtColor(shared, sensor_msgs::image_encodings::BGR8)->image, name);
+    }
+    return toGrey(shared->image, name).clone();
+  }
+  catch (const cv_bridge::Exception& error)
+  {
+    throw ImageError("'" + name + "': encoding '" + image.encoding + "': " + error.what());
+  }
+}
+
+sensor_msgs::Image toImage(const cv::Mat& image, const std::string& encoding, const std_msgs::Header& header)
+{
+  sensor_msgs::Image message;
+  cv_bridge::CvImage(header, encoding, image).toImageMsg(message);
+  return message;
+}
+
+cv::Rect toRect(const sensor_msgs::RegionOfInterest& roi, const cv::Size& image)
+{
+  if (roi.width == 0 && roi.height == 0)
+  {
+    return {};
+  }
+  const std::uint64_t right = std::uint64_t{ roi.x_offset } + roi.width;
+  const std::uint64_t bottom = std::uint64_t{ roi.y_offset } + roi.height;
+  if (roi.width == 0 || roi.height == 0 || right > static_cast<std::uint64_t>(image.width) ||
+      bottom > static_cast<std::uint64_t>(image.height))
+  {
+    throw ImageError("roi: " + std::to_string(roi.width) + " x " + std::to_string(roi.height) + " at (" +
+                     std::to_string(roi.x_offset) + ", " + std::to_string(roi.y_offset) +
+                     ") does not lie within the image of " + std::to_string(image.width) + " x " +
+                     std::to_string(image.height));
+  }
+  return { static_cast<int>(roi.x_offset), static_cast<int>(roi.y_offset), static_cast<int>(roi.width),
+           static_cast<int>(roi.height) };
+}
+
+sensor_msgs::RegionOfInterest toRegionOfInterest(const cv::Rect& rect)
+{
+  sensor_msgs::RegionOfInterest roi;
+  roi.x_offset = static_cast<std::uint32_t>(rect.x);
+  roi.y_offset = static_cast<std::uint32_t>(rect.y);
+  roi.width = static_cast<std::uint32_t>(rect.width);
+  roi.height = static_cast<std::uint32_t>(rect.height);
+  return roi;
+}
+
+ViewPose toViewPose(const geometry_msgs::TransformStamped& transform)
+{
+  const geometry_msgs::Vector3& position = transform.transform.translation;
+  const geometry_msgs::Quaternion& orientation = transform.transform.rotation;
+  return { transform.header.frame_id,
+           { position.x, position.y, position.z },
+           { orientation.w, orientation.x, orientation.y, orientation.z } };
+}
+
+geometry_msgs::PoseStamped toPoseStamped(const ViewPose& pose, const ros::Time& stamp)
+{
+  geometry_msgs::PoseStamped message;
+  message.header.stamp = stamp;
+  message.header.frame_id = pose.frame;
+  message.pose.position.x = pose.position.x();
+  message.pose.position.y = pose.position.y();
+  message.pose.position.z = pose.position.z();
+  message.pose.orientation.x = pose.orientation.x();
+  message.pose.orientation.y = pose.orientation.y();
+  message.pose.orientation.z = pose.orientation.z();
+  message.pose.orientation.w = pose.orientation.w();
+  return message;
+}
+
+std::vector<PointMatch> toPointMatches(const std::vector<MatchedPoint>& matches)
+{
+  std::vector<PointMatch> messages(matches.size());
+  std::transform(matches.begin(), matches.end(), messages.begin(), [](const MatchedPoint& match) {
+    PointMatch message;
+    message.reference_x = match.position.reference.x();
+    message.reference_y = match.position.reference.y();
+    message.current_x = match.position.current.x();
+    message.current_y = match.position.current.y();
+    message.score = match.score;
+    message.inlier = match.inlier;
+    return message;
+  });
+  return messages;
+}
+
+Homography toHomography(const ViewMatch& match, const std::string& view, const std_msgs::Header& header)
+{
+  const bool valid = match.outcome == MatchOutcome::MATCHED && match.model == GeometryModel::HOMOGRAPHY;
+
+  Homography message;
+  message.header = header;
+  message.view = view;
+  message.state = valid ? Homography::TRACKING : Homography::SEARCHING;
+  message.valid = valid;
+  copyRowMajor(valid ? match.matrix : Eigen::Matrix3d::Constant(NOT_A_NUMBER).eval(), message.h);
+  message.matches = static_cast<std::int32_t>(match.matches.size());
+  message.inliers = valid ? match.inliers : 0;
+  message.rms_error = valid ? match.rms_error : NOT_A_NUMBER;
+  message.rotation = unknownRotation();
+  message.translation_over_distance = unknownVector();
+  message.normal = unknownVector();
+  message.distance = NOT_A_NUMBER;
+  return message;
+}
+
+}  // namespace view_servo

@@ -1,0 +1,109 @@
+// Copyright (c) 2026, the view_servo authors
+// SPDX-License-Identifier: BSD-3-Clause
+#include "view_servo/ros/image_source.h"
+
+#include "view_servo/ros/conversions.h"
+#include "view_servo/views/image_io.h"
+
+#include <cstdlib>
+#include <utility>
+#include <vector>
+
+namespace view_servo
+{
+namespace
+{
+std::filesystem::path defaultViewsDir()
+{
+  const char* ros_home = std::getenv("ROS_HOME");
+  const char* home = std::getenv("HOME");
+  const std::filesystem::path root =
+      ros_home != nullptr ? std::filesystem::path(ros_home) : std::filesystem::path(home != nullptr ? home : ".") / ".ros";
+  return root / "view_servo" / "views";
+}
+
+}  // namespace
+
+SourceKind kindOf(const ImageSource& source, const std::string& name)
+{
+  const sensor_msgs::Image& image = source.image;
+  std::vector<std::pair<SourceKind, std::string>> given;
+  if (!source.view.empty())
+  {
+    given.emplace_back(SourceKind::VIEW, "view");
+  }
+  if (!source.path.empty())
+  {
+    given.emplace_back(SourceKind::PATH, "path");
+  }
+  if (!image.data.empty() || !image.encoding.empty() || image.width != 0 || image.height != 0)
+  {
+    given.emplace_back(SourceKind::IMAGE, "image");
+  }
+  if (given.size() > 1)
+  {
+    std::string fields;
+    for (const auto& [kind, field] : given)
+    {
+      fields += (fields.empty() ? "" : " and ") + field;
+    }
+    throw ImageError(name + ": only one of view, path and image may be set, not " + fields);
+  }
+  return given.empty() ? SourceKind::CAMERA : given.front().first;
+}
+
+ImageSourceParams ImageSourceParams::read(ParameterReader& reader)
+{
+  ImageSourceParams params;
+  std::string views_dir;
+  reader.read("views_dir", views_dir);
+  params.views_dir = views_dir.empty() ? defaultViewsDir() : std::filesystem::path(views_dir);
+  reader.read("allow_paths", params.allow_paths);
+  return params;
+}
+
+ImageSourceReader::ImageSourceReader(const ImageSourceParams& params, const CameraInput& camera)
+  : allow_paths_(params.allow_paths), store_(params.views_dir), camera_(camera)
+{
+}
+
+SourcedImage ImageSourceReader::read(const ImageSource& source, const std::string& name) const
+{
+  SourcedImage result;
+  switch (kindOf(source, name))
+  {
+    case SourceKind::CAMERA:
+    {
+      const CameraFrame frame = camera_.latest();
+      result.grey = toGrey(*frame.image, camera_.imageTopic());
+      result.header = frame.image->header;
+      result.camera = toCamera(*frame.info);
+      break;
+    }
+    case SourceKind::VIEW:
+    {
+      const StoredView view = store_.load(source.view);
+      result.grey = view.image;
+      result.region = view.region;
+      result.header.stamp.fromSec(view.stamp);
+      result.header.frame_id = view.frame_id;
+      result.camera = view.camera;
+      result.pose = view.pose;
+      break;
+    }
+    case SourceKind::PATH:
+      if (!allow_paths_)
+      {
+        throw ImageError(name + ".path: files are refused, this node's ~allow_paths is false");
+      }
+      result.grey = readGreyImage(source.path);
+      break;
+    case SourceKind::IMAGE:
+      result.grey = toGrey(source.image, name + ".image");
+      result.header = source.image.header;
+      break;
+  }
+  return result;
+}
+
+}  // namespace view_servo

@@ -1,0 +1,171 @@
+// Copyright (c) 2026, the view_servo authors
+// SPDX-License-Identifier: BSD-3-Clause
+#include "view_servo/ros/parameters.h"
+
+#include <ros/console.h>
+#include <ros/param.h>
+
+#include <algorithm>
+#include <optional>
+#include <sstream>
+#include <stdexcept>
+
+namespace view_servo
+{
+namespace
+{
+/** Empty for values that are not scalars. */
+std::optional<std::string> toText(XmlRpc::XmlRpcValue value, const std::string& type)
+{
+  switch (value.getType())
+  {
+    case XmlRpc::XmlRpcValue::TypeBoolean:
+      // Yaml reads the bare word `off` as a boolean.
+      if (type.find('|') != std::string::npos)
+      {
+        return static_cast<bool>(value) ? "on" : "off";
+      }
+      return static_cast<bool>(value) ? "true" : "false";
+    case XmlRpc::XmlRpcValue::TypeInt:
+      return std::to_string(static_cast<int>(value));
+    case XmlRpc::XmlRpcValue::TypeDouble:
+    {
+      std::ostringstream stream;
+      stream.precision(17);
+      stream << static_cast<double>(value);
+      return stream.str();
+    }
+    case XmlRpc::XmlRpcValue::TypeString:
+      return static_cast<std::string>(value);
+    default:
+      return std::nullopt;
+  }
+}
+
+std::string join(const std::vector<std::string>& words, const std::string& separator)
+{
+  std::string text;
+  for (const std::string& word : words)
+  {
+    text += (text.empty() ? "" : separator) + word;
+  }
+  return text;
+}
+
+}  // namespace
+
+ParameterReader::ParameterReader(const ros::NodeHandle& private_nh) : private_nh_(private_nh)
+{
+}
+
+template <typename T>
+void ParameterReader::readAs(const std::string& name, const std::string& type, T& value)
+{
+  expect(name);
+  if (private_nh_.hasParam(name) && !private_nh_.getParam(name, value))
+  {
+    faults_.push_back("~" + name + " must be " + type);
+  }
+  std::ostringstream text;
+  text << std::boolalpha << name << "=" << value;
+  values_.push_back(text.str());
+}
+
+void ParameterReader::read(const std::string& name, bool& value)
+{
+  readAs(name, "true or false", value);
+}
+
+void ParameterReader::read(const std::string& name, int& value)
+{
+  readAs(name, "a whole number", value);
+}
+
+void ParameterReader::read(const std::string& name, double& value)
+{
+  readAs(name, "a number", value);
+}
+
+void ParameterReader::read(const std::string& name, std::string& value)
+{
+  readAs(name, "a string; quote it where it looks like a number", value);
+}
+
+void ParameterReader::read(const std::vector<Parameter>& table)
+{
+  for (const Parameter& parameter : table)
+  {
+    expect(parameter.name);
+    XmlRpc::XmlRpcValue value;
+    if (private_nh_.getParam(parameter.name, value))
+    {
+      const std::optional<std::string> text = toText(value, parameter.type);
+      if (!text || !parameter.set(*text))
+      {
+        faults_.push_back("~" + parameter.name + " must be " + parameter.type + (text ? ", not '" + *text + "'" : ""));
+      }
+    }
+    values_.push_back(parameter.name + "=" + parameter.get());
+  }
+}
+
+void ParameterReader::require(bool condition, const std::string& fault)
+{
+  if (!condition)
+  {
+    faults_.push_back(fault);
+  }
+}
+
+void ParameterReader::addFaults(const std::vector<std::string>& faults)
+{
+  faults_.insert(faults_.end(), faults.begin(), faults.end());
+}
+
+void ParameterReader::expect(const std::string& name)
+{
+  known_.push_back({ name, "", "", nullptr, nullptr });
+}
+
+void ParameterReader::finish() const
+{
+  warnOfUnknown();
+  if (!faults_.empty())
+  {
+    throw std::invalid_argument("unusable parameters:\n  " + join(faults_, "\n  "));
+  }
+  ROS_INFO_STREAM("parameters: " << join(values_, ", "));
+}
+
+void ParameterReader::warnOfUnknown() const
+{
+  std::vector<std::string> keys;
+  ros::param::getParamNames(keys);
+  const std::string prefix = private_nh_.getNamespace() + "/";
+  for (const std::string& key : keys)
+  {
+    if (key.compare(0, prefix.size(), prefix) != 0)
+    {
+      continue;
+    }
+    const std::string name = key.substr(prefix.size());
+    const bool known = std::any_of(known_.begin(), known_.end(),
+                                   [&](const Parameter& parameter) { return parameter.name == name; });
+    // Deeper names belong to plugins, such as image transports.
+    if (!known && name.find('/') == std::string::npos)
+    {
+      ROS_WARN_STREAM("~" << name << " is not a parameter of this node and is ignored (did you mean ~"
+                          << nearestName(known_, name) << "?)");
+    }
+  }
+}
+
+ViewMatcherParams readMatcherParams(ParameterReader& reader)
+{
+  ViewMatcherParams params;
+  reader.read(matcherParameters(params));
+  reader.addFaults(params.validate());
+  return params;
+}
+
+}  // namespace view_servo

@@ -1,0 +1,215 @@
+// Copyright (c) 2026, the view_servo authors
+// SPDX-License-Identifier: BSD-3-Clause
+#include "view_servo/views/matcher_parameters.h"
+
+#include <algorithm>
+#include <cmath>
+#include <locale>
+#include <sstream>
+#include <stdexcept>
+#include <utility>
+
+namespace view_servo
+{
+namespace
+{
+/** The whole text as one value; locale-independent. */
+template <typename T>
+bool parse(const std::string& text, T& value)
+{
+  std::istringstream stream(text);
+  stream.imbue(std::locale::classic());
+  T parsed{};
+  if (!(stream >> parsed) || !(stream >> std::ws).eof())
+  {
+    return false;
+  }
+  value = parsed;
+  return true;
+}
+
+template <typename T>
+std::string print(const T& value)
+{
+  std::ostringstream stream;
+  stream.imbue(std::locale::classic());
+  stream << value;
+  return stream.str();
+}
+
+template <typename T>
+Parameter number(std::string name, const char* type, T& value, std::string description)
+{
+  return { std::move(name), type, std::move(description), [&value] { return print(value); },
+           [&value](const std::string& text) { return parse(text, value); } };
+}
+
+Parameter integer(std::string name, int& value, std::string description)
+{
+  return number(std::move(name), "int", value, std::move(description));
+}
+
+Parameter real(std::string name, double& value, std::string description)
+{
+  Parameter parameter = number(std::move(name), "double", value, std::move(description));
+  parameter.set = [&value](const std::string& text) {
+    double parsed = 0.0;
+    if (!parse(text, parsed) || !std::isfinite(parsed))
+    {
+      return false;
+    }
+    value = parsed;
+    return true;
+  };
+  return parameter;
+}
+
+/** A choice among words; booleans are the words true and false. */
+template <typename T>
+Parameter choice(std::string name, T& value, std::vector<std::pair<std::string, T>> words, std::string description)
+{
+  std::string type;
+  for (const auto& word : words)
+  {
+    type += (type.empty() ? "" : "|") + word.first;
+  }
+  const auto get = [&value, words] {
+    for (const auto& word : words)
+    {
+      if (word.second == value)
+      {
+        return word.first;
+      }
+    }
+    return std::string();
+  };
+  const auto set = [&value, words](const std::string& text) {
+    for (const auto& word : words)
+    {
+      if (word.first == text)
+      {
+        value = word.second;
+        return true;
+      }
+    }
+    return false;
+  };
+  return { std::move(name), type, std::move(description), get, set };
+}
+
+Parameter boolean(std::string name, bool& value, std::string description)
+{
+  Parameter parameter =
+      choice<bool>(std::move(name), value, { { "true", true }, { "false", false } }, std::move(description));
+  parameter.type = "bool";
+  return parameter;
+}
+
+std::size_t editDistance(const std::string& a, const std::string& b)
+{
+  std::vector<std::size_t> row(b.size() + 1);
+  for (std::size_t j = 0; j <= b.size(); ++j)
+  {
+    row[j] = j;
+  }
+  for (std::size_t i = 1; i <= a.size(); ++i)
+  {
+    std::size_t diagonal = row[0];
+    row[0] = i;
+    for (std::size_t j = 1; j <= b.size(); ++j)
+    {
+      const std::size_t replaced = diagonal + (a[i - 1] == b[j - 1] ? 0 : 1);
+      diagonal = row[j];
+      row[j] = std::min({ replaced, row[j] + 1, row[j - 1] + 1 });
+    }
+  }
+  return row[b.size()];
+}
+
+}  // namespace
+
+std::string nearestName(const std::vector<Parameter>& table, const std::string& name)
+{
+  const auto nearest = std::min_element(table.begin(), table.end(), [&](const Parameter& a, const Parameter& b) {
+    return editDistance(a.name, name) < editDistance(b.name, name);
+  });
+  return nearest == table.end() ? std::string() : nearest->name;
+}
+
+std::vector<Parameter> matcherParameters(ViewMatcherParams& params)
+{
+  PointMatcherParams& points = params.points;
+  CornerParams& corners = points.corners;
+  ProfileParams& profiles = points.profiles;
+  ProfileSearchParams& search = points.search;
+  return {
+    integer("max_corners", corners.max_corners, "corners kept in each image, strongest first, 1 to 5000"),
+    real("derivative_sigma", corners.derivative_sigma, "scale of the Harris detector's derivatives [px], (0, 20]"),
+    real("integration_sigma", corners.integration_sigma, "scale of the Harris detector's window [px], (0, 20]"),
+    real("harris_k", corners.k, "k in R = det(M) - k tr(M)^2, [0, 0.25)"),
+    real("corner_distance", corners.min_distance, "smallest distance between corners [px], 0 to 1000"),
+    real("corner_threshold", corners.relative_threshold, "smallest response, as a part of the strongest, [0, 1)"),
+    integer("corner_border", corners.border, "no corners closer to the image's border [px], >= 1"),
+    choice<PairSelection>("pair_selection", profiles.selection,
+                          { { "nearest", PairSelection::NEAREST }, { "radius", PairSelection::RADIUS } },
+                          "pair each corner with its nearest (K_c) or with all in a radius (D_c)"),
+    integer("pair_neighbours", profiles.neighbours, "K_c: corners that each is paired with, >= 1"),
+    real("pair_radius", profiles.max_length, "D_c: longest profile [px], > profile_min_length"),
+    real("profile_min_length", profiles.min_length, "shortest profile [px], >= 2"),
+    integer("coefficients", profiles.coefficients, "N_f: Fourier features a profile, 4, 6 or 8"),
+    real("profile_contrast", profiles.min_contrast, "least deviation of a profile from its mean [grey levels], (0, 255)"),
+    choice<ProfileSearch>("search", search.search,
+                          { { "nearest", ProfileSearch::NEAREST }, { "radius", ProfileSearch::RADIUS } },
+                          "a profile votes for its nearest (K_v) or for all in a radius (D_v)"),
+    integer("search_neighbours", search.neighbours, "K_v: profiles that each votes for, 1 to 1000"),
+    real("search_radius", search.radius, "D_v: distance of similar profiles [standard deviations], > 0"),
+    real("search_epsilon", search.epsilon, "tolerance of the search for the nearest, 0 = exact, >= 0"),
+    choice<AssignmentMethod>("assignment", points.assignment,
+                             { { "exact", AssignmentMethod::EXACT }, { "greedy", AssignmentMethod::GREEDY } },
+                             "how candidates are taken from the association"),
+    boolean("cyclic_order", points.cyclic_order, "align the profiles around corners in cyclic order"),
+    real("cyclic_correlation", points.min_correlation, "least correlation of aligned profiles, [0, 1)"),
+    integer("cyclic_entries", points.cyclic_entries, "entries aligned in each row and column, 0 = all"),
+    real("inlier_threshold", params.ransac.inlier_threshold, "largest error of an inlier [px], > 0"),
+    real("ransac_confidence", params.ransac.confidence, "wanted probability of an outlier-free sample, (0, 1)"),
+    integer("ransac_min_iterations", params.ransac.min_iterations, "samples drawn at least, >= 0"),
+    integer("ransac_max_iterations", params.ransac.max_iterations, "samples drawn at most, >= 1"),
+    integer("ransac_max_rejected", params.ransac.max_rejected, "samples that a cheap test may refuse, >= 0"),
+    integer("local_optimizations", params.ransac.local_optimizations, "refits of a new best model, 0 = off"),
+    boolean("improvement_stage", params.ransac.improvement_stage, "exchange each datum of the best sample in turn"),
+    choice<Sampling>("sampling", params.ransac.sampling,
+                     { { "uniform", Sampling::UNIFORM }, { "progressive", Sampling::PROGRESSIVE } },
+                     "draw all candidates alike, or the best first (PROSAC)"),
+    choice<ViewConsistency>("view_consistency", params.view_consistency,
+                            { { "off", ViewConsistency::OFF },
+                              { "before", ViewConsistency::BEFORE },
+                              { "within", ViewConsistency::WITHIN } },
+                            "where the constraint on five points is used"),
+    real("consistency_threshold", params.consistency.threshold, "violation of a consistent group, (0, 1]"),
+    real("consistency_increments", params.consistency.mean_increments, "counts a candidate, on average, > 0"),
+    integer("consistency_max_groups", params.consistency.max_groups, "groups of five drawn at most, >= 1"),
+    boolean("guided", params.guided, "look for more matches along the geometry found"),
+    integer("patch_radius", params.guidance.patch_radius, "patches compared by guided matching [px], 1 to 50"),
+    real("patch_correlation", params.guidance.min_correlation, "least correlation of the patches, [-1, 1)"),
+    boolean("scale_search", params.scale_search, "try other scales when the first finds no geometry"),
+    real("min_significance", params.min_log_significance, "-log10 of the false alarms a geometry may have, >= 0"),
+    number("seed", "int", params.seed, "of all random draws"),
+  };
+}
+
+void setParameter(ViewMatcherParams& params, const std::string& name, const std::string& value)
+{
+  const std::vector<Parameter> table = matcherParameters(params);
+  const auto found =
+      std::find_if(table.begin(), table.end(), [&](const Parameter& parameter) { return parameter.name == name; });
+  if (found == table.end())
+  {
+    throw std::invalid_argument("unknown parameter '" + name + "' (did you mean '" + nearestName(table, name) + "'?)");
+  }
+  if (!found->set(value))
+  {
+    throw std::invalid_argument("parameter '" + name + "': '" + value + "' is not of type " + found->type);
+  }
+}
+
+}  // namespace view_servo

@@ -1,0 +1,528 @@
+// Copyright (c) 2026, the view_servo authors
+// SPDX-License-Identifier: BSD-3-Clause
+#include "view_servo/views/view_matcher.h"
+
+#include "view_servo/geometry/fundamental.h"
+#include "view_servo/geometry/homography.h"
+#include "view_servo/robust/fundamental_estimator.h"
+#include "view_servo/robust/homography_estimator.h"
+
+#include <Eigen/Geometry>
+#include <Eigen/LU>
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <limits>
+#include <optional>
+#include <stdexcept>
+#include <utility>
+
+namespace view_servo
+{
+namespace
+{
+constexpr double NOT_A_NUMBER = std::numeric_limits<double>::quiet_NaN();
+constexpr std::size_t MIN_CORNERS = 8;
+constexpr int GUIDED_ROUNDS = 2;
+constexpr double HUBER_WIDTH = 0.5;  // of the final fits: residuals beyond count linearly [px]
+
+/** Which levels of reference and current image are compared, in the order of trial. */
+struct LevelPair
+{
+  int reference;
+  int current;
+};
+constexpr LevelPair ATTEMPTS[] = { { 0, 0 }, { 2, 2 }, { 2, 0 }, { 0, 2 }, { 3, 0 }, { 0, 3 }, { 4, 4 } };
+
+/** Adds the time since the last call, or since construction, to a stage. */
+class StageClock
+{
+public:
+  explicit StageClock(std::vector<StageTime>& stages) : stages_(stages), start_(Clock::now()), last_(start_)
+  {
+  }
+  void finish(const std::string& stage)
+  {
+    const Clock::time_point now = Clock::now();
+    const double ms = std::chrono::duration<double, std::milli>(now - last_).count();
+    last_ = now;
+    for (StageTime& known : stages_)
+    {
+      if (known.name == stage)
+      {
+        known.ms += ms;
+        return;
+      }
+    }
+    stages_.push_back({ stage, ms });
+  }
+  double total() const
+  {
+    return std::chrono::duration<double, std::milli>(Clock::now() - start_).count();
+  }
+
+private:
+  using Clock = std::chrono::steady_clock;
+  std::vector<StageTime>& stages_;
+  Clock::time_point start_;
+  Clock::time_point last_;
+};
+
+double log10Choose(double n, double k)
+{
+  return (std::lgamma(n + 1.0) - std::lgamma(k + 1.0) - std::lgamma(n - k + 1.0)) / std::log(10.0);
+}
+
+/**
+ * -log10 of the number of models with this many inliers to be expected among matches made by chance (a-contrario,
+ * Moisan & Stival 2004): (n - s) C(n, k) C(k, s) p^(k - s), with p the probability that a random point agrees.
+ */
+double logSignificance(std::size_t candidates, std::size_t inliers, int sample_size, double probability)
+{
+  if (inliers <= static_cast<std::size_t>(sample_size))
+  {
+    return 0.0;
+  }
+  const double n = static_cast<double>(candidates);
+  const double k = static_cast<double>(inliers);
+  const double log_false_alarms = std::log10(n - sample_size) + log10Choose(n, k) + log10Choose(k, sample_size) +
+                                  (k - sample_size) * std::log10(probability);
+  return -log_false_alarms;
+}
+
+struct Fit
+{
+  Eigen::Matrix3d matrix;
+  std::vector<int> inliers;
+};
+
+/** What differs between the two models. Errors are squared, as in robust/. */
+class Geometry
+{
+public:
+  Geometry(GeometryModel model, const ViewMatcherParams& params, double threshold)
+    : model_(model), params_(params), threshold_(threshold)
+  {
+  }
+
+  /** Robust fit to correspondences: the matrix and the indices of the inliers; empty when no sample gave one. */
+  std::optional<Fit> estimate(const Correspondences& pairs, RansacStatistics& statistics, Rng& rng) const
+  {
+    RansacParams ransac_params = params_.ransac;
+    ransac_params.inlier_threshold = threshold_;
+    if (model_ == GeometryModel::HOMOGRAPHY)
+    {
+      auto result = ransac(HomographyEstimator(pairs), ransac_params, rng);
+      statistics = result.statistics;
+      return result.model ? std::optional<Fit>({ result.model->h, std::move(result.inliers) }) : std::nullopt;
+    }
+    const double view_threshold =
+        params_.view_consistency == ViewConsistency::WITHIN ? params_.consistency.threshold : 0.0;
+    auto result = ransac(FundamentalEstimator(pairs, view_threshold), ransac_params, rng);
+    statistics = result.statistics;
+    return result.model ? std::optional<Fit>({ *result.model, std::move(result.inliers) }) : std::nullopt;
+  }
+
+  /** Probability that a match made by chance agrees with a model. */
+  double chance(const cv::Size& current) const
+  {
+    const double area = static_cast<double>(current.area());
+    const double diagonal = std::hypot(current.width, current.height);
+    const double agreeing =
+        model_ == GeometryModel::HOMOGRAPHY ? M_PI * threshold_ * threshold_ : 2.0 * threshold_ * diagonal;
+    return std::min(1.0, agreeing / area);
+  }
+
+  bool isHomography() const
+  {
+    return model_ == GeometryModel::HOMOGRAPHY;
+  }
+
+  double threshold() const
+  {
+    return threshold_;
+  }
+
+  int sampleSize() const
+  {
+    return model_ == GeometryModel::HOMOGRAPHY ? HomographyEstimator::SAMPLE_SIZE : FundamentalEstimator::SAMPLE_SIZE;
+  }
+
+  double squaredError(const Eigen::Matrix3d& matrix, const Correspondence& pair) const
+  {
+    return model_ == GeometryModel::HOMOGRAPHY ? 0.5 * symmetricTransferError(matrix, matrix.inverse(), pair) :
+                                                 sampsonError(matrix, pair);
+  }
+
+  bool agrees(const Eigen::Matrix3d& matrix, const Correspondence& pair) const
+  {
+    return squaredError(matrix, pair) <= threshold_ * threshold_;
+  }
+
+  Eigen::Matrix3d refine(const Eigen::Matrix3d& matrix, const Correspondences& pairs) const
+  {
+    return model_ == GeometryModel::HOMOGRAPHY ? refineHomography(matrix, pairs, HUBER_WIDTH) :
+                                                 refineFundamental(matrix, pairs, HUBER_WIDTH);
+  }
+
+private:
+  GeometryModel model_;
+  const ViewMatcherParams& params_;
+  double threshold_;
+};
+
+/**
+ * Whether the matches keep the sense of rotation of neighbouring points. In a mirrored image (a plane seen from behind)
+ * they reverse it, which a fundamental matrix alone can not tell.
+ */
+bool keepsOrientation(const Correspondences& pairs)
+{
+  int kept = 0;
+  int reversed = 0;
+  for (std::size_t i = 0; i < pairs.size(); ++i)
+  {
+    // The two nearest in the reference.
+    std::size_t near[2] = { i, i };
+    double distance[2] = { std::numeric_limits<double>::infinity(), std::numeric_limits<double>::infinity() };
+    for (std::size_t j = 0; j < pairs.size(); ++j)
+    {
+      const double squared = (pairs[j].reference - pairs[i].reference).squaredNorm();
+      if (j == i || squared >= distance[1])
+      {
+        continue;
+      }
+      const std::size_t place = squared < distance[0] ? 0 : 1;
+      if (place == 0)
+      {
+        near[1] = near[0];
+        distance[1] = distance[0];
+      }
+      near[place] = j;
+      distance[place] = squared;
+    }
+    const auto twice_area = [](const Eigen::Vector2d& a, const Eigen::Vector2d& b, const Eigen::Vector2d& c) {
+      return (b - a).x() * (c - a).y() - (b - a).y() * (c - a).x();
+    };
+    const double product = twice_area(pairs[i].reference, pairs[near[0]].reference, pairs[near[1]].reference) *
+                           twice_area(pairs[i].current, pairs[near[0]].current, pairs[near[1]].current);
+    kept += product > 0.0 ? 1 : 0;
+    reversed += product < 0.0 ? 1 : 0;
+  }
+  return kept > reversed;
+}
+
+/** A reference corner and where it is in the current image, in the pixels of their levels. */
+struct Match
+{
+  int row;
+  Eigen::Vector2d current;
+  double score;
+};
+
+/** One comparison of two levels: candidates and, if they support one, the geometry. */
+class Attempt
+{
+public:
+  Attempt(const PreparedImage& reference, const PreparedImage& current, const LevelPair& levels,
+          const Geometry& geometry, const ViewMatcherParams& params)
+    : reference_(reference)
+    , current_(current)
+    , levels_(levels)
+    , geometry_(geometry)
+    , params_(params)
+    , from_(reference.points(levels.reference))
+    , to_(current.points(levels.current))
+  {
+  }
+
+  bool hasFeatures() const
+  {
+    return from_.corners.size() >= MIN_CORNERS && to_.corners.size() >= MIN_CORNERS;
+  }
+
+  /** Associates, chooses candidates and fits; true when the geometry is one that chance does not explain. */
+  bool run(ViewMatch& result, StageClock& clock, Rng& rng)
+  {
+    association_ = associatePoints(from_, reference_.profileIndex(levels_.reference), to_, params_.points);
+    clock.finish("association");
+    Correspondences pairs;
+    for (const Association& candidate : candidateMatches(association_, params_.points.assignment))
+    {
+      candidates_.push_back({ candidate.row, to_.corners[static_cast<std::size_t>(candidate.column)].position,
+                              candidate.weight });
+      pairs.push_back(correspondence(candidates_.back()));
+    }
+    clock.finish("assignment");
+    if (params_.view_consistency == ViewConsistency::BEFORE)
+    {
+      std::vector<Match> kept;
+      Correspondences kept_pairs;
+      for (const int i : viewConsistentCandidates(pairs, params_.consistency, rng))
+      {
+        kept.push_back(candidates_[static_cast<std::size_t>(i)]);
+        kept_pairs.push_back(pairs[static_cast<std::size_t>(i)]);
+      }
+      candidates_ = std::move(kept);
+      pairs = std::move(kept_pairs);
+      clock.finish("view_consistency");
+    }
+
+    const std::optional<Fit> fit = geometry_.estimate(pairs, result.ransac, rng);
+    clock.finish("ransac");
+    result.log_significance = 0.0;
+    if (!fit)
+    {
+      return false;
+    }
+    result.log_significance =
+        logSignificance(pairs.size(), fit->inliers.size(), geometry_.sampleSize(),
+                        geometry_.chance(current_.image(levels_.current).size()));
+    Correspondences supporting;
+    for (const int i : fit->inliers)
+    {
+      inliers_.push_back(candidates_[static_cast<std::size_t>(i)]);
+      supporting.push_back(pairs[static_cast<std::size_t>(i)]);
+    }
+    if (result.log_significance < params_.min_log_significance || !keepsOrientation(supporting))
+    {
+      inliers_.clear();
+      return false;
+    }
+    matrix_ = geometry_.refine(fit->matrix, supporting);
+    return true;
+  }
+
+  /** More matches along the geometry that was found, and a better geometry from them. */
+  void guide()
+  {
+    for (int round = 0; round < GUIDED_ROUNDS; ++round)
+    {
+      const std::vector<Match> found = geometry_.isHomography() ? alongHomography() : alongFundamental();
+      Correspondences supporting;
+      for (const Match& match : found)
+      {
+        supporting.push_back(correspondence(match));
+      }
+      const Eigen::Matrix3d refined = geometry_.refine(matrix_, supporting);
+      std::vector<Match> agreeing;
+      for (const Match& match : found)
+      {
+        if (geometry_.agrees(refined, correspondence(match)))
+        {
+          agreeing.push_back(match);
+        }
+      }
+      if (agreeing.size() < inliers_.size() / 2)
+      {
+        return;  // patches cannot be compared here (blur, reflections): what the profiles found stands
+      }
+      matrix_ = refined;
+      inliers_ = std::move(agreeing);
+    }
+  }
+
+  /** Writes what was found in the pixels of the full images: inliers, and the candidates of all other corners. */
+  void report(bool accepted, ViewMatch& result) const
+  {
+    const Eigen::Matrix3d reference_map = reference_.toFull(levels_.reference);
+    const Eigen::Matrix3d current_map = current_.toFull(levels_.current);
+    const auto add = [&](const Match& match, bool inlier) {
+      const Correspondence pair = correspondence(match);
+      result.matches.push_back({ { (reference_map * pair.reference.homogeneous()).hnormalized(),
+                                   (current_map * pair.current.homogeneous()).hnormalized() },
+                                 match.score,
+                                 inlier });
+    };
+    result.matches.clear();
+    std::vector<char> used(from_.corners.size(), 0);
+    for (const Match& match : inliers_)
+    {
+      used[static_cast<std::size_t>(match.row)] = 1;
+      add(match, true);
+    }
+    for (const Match& candidate : candidates_)
+    {
+      if (used[static_cast<std::size_t>(candidate.row)] == 0)
+      {
+        add(candidate, false);
+      }
+    }
+    std::stable_sort(result.matches.begin(), result.matches.end(),
+                     [](const MatchedPoint& a, const MatchedPoint& b) { return a.score > b.score; });
+    if (!accepted)
+    {
+      return;
+    }
+    double squares = 0.0;
+    for (const Match& match : inliers_)
+    {
+      squares += geometry_.squaredError(matrix_, correspondence(match));
+    }
+    result.outcome = MatchOutcome::MATCHED;
+    result.inliers = static_cast<int>(inliers_.size());
+    result.rms_error = std::sqrt(squares / static_cast<double>(inliers_.size()));
+    result.matrix = geometry_.isHomography() ?
+                        normalizedHomography(current_map * matrix_ * reference_map.inverse()) :
+                        Eigen::Matrix3d((current_map.inverse().transpose() * matrix_ * reference_map.inverse())
+                                            .normalized());
+    result.reference_level = levels_.reference;
+    result.current_level = levels_.current;
+  }
+
+private:
+  Correspondence correspondence(const Match& match) const
+  {
+    return { from_.corners[static_cast<std::size_t>(match.row)].position, match.current };
+  }
+
+  std::vector<Match> alongHomography() const
+  {
+    std::vector<double> scores(from_.corners.size(), 0.0);
+    for (const Match& candidate : candidates_)
+    {
+      if (geometry_.agrees(matrix_, correspondence(candidate)))
+      {
+        scores[static_cast<std::size_t>(candidate.row)] = candidate.score;
+      }
+    }
+    std::vector<Match> matches;
+    for (const GuidedMatch& match :
+         searchAlongHomography(reference_.image(levels_.reference), from_.corners, current_.image(levels_.current),
+                               matrix_, geometry_.threshold(), params_.guidance))
+    {
+      matches.push_back({ match.reference, match.current, scores[static_cast<std::size_t>(match.reference)] });
+    }
+    return matches;
+  }
+
+  std::vector<Match> alongFundamental() const
+  {
+    std::vector<Match> matches;
+    for (const Association& match :
+         maximumWeightMatching(associateAlongFundamental(association_, from_.corners, to_.corners, matrix_,
+                                                         geometry_.threshold())))
+    {
+      matches.push_back({ match.row, to_.corners[static_cast<std::size_t>(match.column)].position,
+                          association_.weight(match.row, match.column) });
+    }
+    return matches;
+  }
+
+  const PreparedImage& reference_;
+  const PreparedImage& current_;
+  const LevelPair levels_;
+  const Geometry& geometry_;
+  const ViewMatcherParams& params_;
+  const PointFeatures& from_;
+  const PointFeatures& to_;
+  AssociationMatrix association_;
+  std::vector<Match> candidates_;
+  std::vector<Match> inliers_;
+  Eigen::Matrix3d matrix_;
+};
+
+}  // namespace
+
+std::vector<std::string> ViewMatcherParams::validate() const
+{
+  std::vector<std::string> faults;
+  for (const std::vector<std::string>& more :
+       { points.validate(), ransac.validate(), consistency.validate(), guidance.validate() })
+  {
+    faults.insert(faults.end(), more.begin(), more.end());
+  }
+  if (!(min_log_significance >= 0.0))
+  {
+    faults.emplace_back("min_log_significance must be at least 0");
+  }
+  return faults;
+}
+
+ViewMatcher::ViewMatcher(const ViewMatcherParams& params) : params_(params)
+{
+  const std::vector<std::string> faults = params.validate();
+  if (!faults.empty())
+  {
+    std::string all = "bad matching parameters:";
+    for (const std::string& fault : faults)
+    {
+      all += "\n  " + fault;
+    }
+    throw std::invalid_argument(all);
+  }
+}
+
+ViewMatch ViewMatcher::match(const PreparedImage& reference, const PreparedImage& current, GeometryModel model,
+                             double inlier_threshold) const
+{
+  if (!(inlier_threshold >= 0.0) || std::isinf(inlier_threshold))
+  {
+    throw std::invalid_argument("inlier_threshold must be a number of pixels, or 0 for the parameter");
+  }
+  const double threshold = inlier_threshold > 0.0 ? inlier_threshold : params_.ransac.inlier_threshold;
+  const Geometry geometry(model, params_, threshold);
+  Rng rng(params_.seed);
+
+  ViewMatch result;
+  result.model = model;
+  result.matrix.setConstant(NOT_A_NUMBER);
+  result.rms_error = NOT_A_NUMBER;
+  StageClock clock(result.stages);
+  bool any_features = false;
+  for (const LevelPair& levels : ATTEMPTS)
+  {
+    const bool first = levels.reference == 0 && levels.current == 0;
+    if (!first && !params_.scale_search)
+    {
+      break;
+    }
+    reference.profileIndex(levels.reference);
+    clock.finish("reference");
+    current.points(levels.current);
+    clock.finish("current");
+    Attempt attempt(reference, current, levels, geometry, params_);
+    if (!attempt.hasFeatures())
+    {
+      continue;
+    }
+    any_features = true;
+    const bool accepted = attempt.run(result, clock, rng);
+    if (accepted && params_.guided)
+    {
+      attempt.guide();
+      clock.finish("guided");
+    }
+    if (accepted || first)  // without a geometry, the candidates of the first comparison are reported
+    {
+      attempt.report(accepted, result);
+    }
+    if (accepted)
+    {
+      break;
+    }
+  }
+
+  if (result.outcome == MatchOutcome::MATCHED)
+  {
+    result.message = std::to_string(result.inliers) + " of " + std::to_string(result.matches.size()) +
+                     " matches agree with one " +
+                     (model == GeometryModel::HOMOGRAPHY ? "homography" : "fundamental matrix");
+  }
+  else if (!any_features)
+  {
+    result.outcome = MatchOutcome::TOO_FEW_FEATURES;
+    result.message = "too few corners: " + std::to_string(reference.points(0).corners.size()) +
+                     " in the reference, " + std::to_string(current.points(0).corners.size()) +
+                     " in the current image, " + std::to_string(MIN_CORNERS) + " needed in each";
+  }
+  else
+  {
+    result.message = "no geometry found: the " + std::to_string(result.matches.size()) +
+                     " candidate matches do not support one better than chance would";
+  }
+  result.elapsed_ms = clock.total();
+  return result;
+}
+
+}  // namespace view_servo

@@ -1,0 +1,546 @@
+// Copyright (c) 2026, the view_servo authors
+// SPDX-License-Identifier: BSD-3-Clause
+#include "view_servo/views/view_store.h"
+
+#include "view_servo/views/image_io.h"
+
+#include <opencv2/imgcodecs.hpp>
+#include <yaml-cpp/yaml.h>
+
+#include <fcntl.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <cerrno>
+#include <cmath>
+#include <cstdint>
+#include <fstream>
+#include <iterator>
+#include <limits>
+#include <sstream>
+#include <string_view>
+#include <system_error>
+
+namespace view_servo
+{
+namespace
+{
+namespace fs = std::filesystem;
+
+constexpr int FORMAT = 1;
+constexpr std::size_t MAX_NAME_LENGTH = 64;
+
+/** The last line of a yaml file is this and the checksum of all text above it. */
+constexpr std::string_view CHECKSUM_KEY = "checksum: ";
+
+/** What is wrong with a view's files; without its name, which whoever catches it knows. */
+class Damage : public std::runtime_error
+{
+public:
+  using std::runtime_error::runtime_error;
+};
+
+/** FNV-1a, 64 bits, in hexadecimal: finds every changed byte, and tells two images of a view apart. */
+std::string checksum(std::string_view bytes)
+{
+  std::uint64_t hash = 0xcbf29ce484222325U;
+  for (const char byte : bytes)
+  {
+    hash = (hash ^ static_cast<unsigned char>(byte)) * 0x100000001b3U;
+  }
+  std::ostringstream text;
+  text << std::hex;
+  text.width(16);
+  text.fill('0');
+  text << hash;
+  return text.str();
+}
+
+fs::path yamlPath(const fs::path& directory, const std::string& name)
+{
+  return directory / (name + ".yaml");
+}
+
+std::string imageFileName(const std::string& name, std::string_view png)
+{
+  return name + "." + checksum(png) + ".png";
+}
+
+[[noreturn]] void throwLastError(const fs::path& path)
+{
+  throw std::system_error(errno, std::generic_category(), path.string());
+}
+
+/** A file descriptor that closes itself. */
+class Descriptor
+{
+public:
+  Descriptor(const fs::path& path, int flags) : path_(path), fd_(::open(path.c_str(), flags | O_CLOEXEC, 0666))
+  {
+    if (fd_ < 0)
+    {
+      throwLastError(path_);
+    }
+  }
+  ~Descriptor()
+  {
+    ::close(fd_);
+  }
+  Descriptor(const Descriptor&) = delete;
+  Descriptor& operator=(const Descriptor&) = delete;
+
+  void write(std::string_view bytes) const
+  {
+    while (!bytes.empty())
+    {
+      const ssize_t written = ::write(fd_, bytes.data(), bytes.size());
+      if (written < 0 && errno != EINTR)
+      {
+        throwLastError(path_);
+      }
+      bytes.remove_prefix(static_cast<std::size_t>(std::max<ssize_t>(written, 0)));
+    }
+  }
+
+  void sync() const
+  {
+    if (::fsync(fd_) != 0)
+    {
+      throwLastError(path_);
+    }
+  }
+
+private:
+  fs::path path_;
+  int fd_;
+};
+
+void syncDirectory(const fs::path& directory)
+{
+  Descriptor(directory, O_RDONLY | O_DIRECTORY).sync();
+}
+
+/** After this the file holds either what it held before or all of `bytes`, whatever happens in between. */
+void replaceFile(const fs::path& path, std::string_view bytes)
+{
+  const fs::path temporary = path.string() + ".tmp";
+  try
+  {
+    const Descriptor file(temporary, O_WRONLY | O_CREAT | O_TRUNC);
+    file.write(bytes);
+    file.sync();
+    fs::rename(temporary, path);
+  }
+  catch (...)
+  {
+    std::error_code ignored;  // the first error is the one to tell
+    fs::remove(temporary, ignored);
+    throw;
+  }
+  syncDirectory(path.parent_path());
+}
+
+/** Empty when there is no such file. */
+std::optional<std::string> readFile(const fs::path& path)
+{
+  std::ifstream file(path, std::ios::binary);
+  if (!file)
+  {
+    if (errno == ENOENT)
+    {
+      return std::nullopt;
+    }
+    throwLastError(path);
+  }
+  return std::string(std::istreambuf_iterator<char>(file), std::istreambuf_iterator<char>());
+}
+
+/** Removes the view's files that its yaml file, if there is one, does not need. */
+void removeLeftovers(const fs::path& directory, const std::string& name, const std::string& image_file)
+{
+  const std::string prefix = name + ".";  // no valid name contains a dot, so these are this view's files
+  for (const fs::directory_entry& entry : fs::directory_iterator(directory))
+  {
+    const std::string file = entry.path().filename().string();
+    if (file.compare(0, prefix.size(), prefix) == 0 && file != name + ".yaml" && file != image_file)
+    {
+      fs::remove(entry.path());
+    }
+  }
+}
+
+void requireFinite(bool finite, const std::string& what)
+{
+  if (!finite)
+  {
+    throw std::invalid_argument(what + " has numbers that are not finite");
+  }
+}
+
+/** @throws std::invalid_argument saying what cannot be stored. */
+void check(const StoredView& view)
+{
+  const cv::Mat& image = view.image;
+  if (image.empty() || image.type() != CV_8UC1)
+  {
+    throw std::invalid_argument("its image is not 8-bit grey");
+  }
+  const std::int64_t pixels = static_cast<std::int64_t>(image.cols) * image.rows;
+  if (std::min(image.cols, image.rows) < MIN_IMAGE_SIDE || pixels > MAX_IMAGE_PIXELS)
+  {
+    throw std::invalid_argument("its image is " + std::to_string(image.cols) + " x " + std::to_string(image.rows) +
+                                " pixels, which is too " + (pixels > MAX_IMAGE_PIXELS ? "large" : "small"));
+  }
+  const cv::Rect& region = view.region;
+  if (!region.empty() && (region.x < 0 || region.y < 0 || region.width > image.cols - region.x ||
+                          region.height > image.rows - region.y))
+  {
+    throw std::invalid_argument("its region of interest leaves the image");
+  }
+  requireFinite(std::isfinite(view.stamp), "its stamp");
+  if (view.camera)
+  {
+    const Camera& camera = *view.camera;
+    const bool finite = camera.k.allFinite() && camera.rectification.allFinite() && camera.projection.allFinite() &&
+                        std::all_of(camera.distortion.begin(), camera.distortion.end(),
+                                    [](double coefficient) { return std::isfinite(coefficient); });
+    requireFinite(finite, "its camera");
+  }
+  if (view.pose)
+  {
+    requireFinite(view.pose->position.allFinite() && view.pose->orientation.coeffs().allFinite(), "its pose");
+  }
+}
+
+/** Row-major, as sensor_msgs/CameraInfo has them. */
+template <typename Matrix>
+std::vector<double> toList(const Matrix& matrix)
+{
+  std::vector<double> list;
+  for (Eigen::Index row = 0; row < matrix.rows(); ++row)
+  {
+    for (Eigen::Index column = 0; column < matrix.cols(); ++column)
+    {
+      list.push_back(matrix(row, column));
+    }
+  }
+  return list;
+}
+
+template <typename Matrix>
+void fromList(const YAML::Node& node, Matrix& matrix)
+{
+  const auto list = node.as<std::vector<double>>();
+  if (static_cast<Eigen::Index>(list.size()) != matrix.size())
+  {
+    throw Damage("a list of " + std::to_string(matrix.size()) + " numbers has " + std::to_string(list.size()));
+  }
+  for (Eigen::Index row = 0; row < matrix.rows(); ++row)
+  {
+    for (Eigen::Index column = 0; column < matrix.cols(); ++column)
+    {
+      matrix(row, column) = list[static_cast<std::size_t>(row * matrix.cols() + column)];
+    }
+  }
+}
+
+template <typename Value>
+void emit(YAML::Emitter& yaml, const std::string& key, const Value& value)
+{
+  yaml << YAML::Key << key << YAML::Value << value;
+}
+
+void emit(YAML::Emitter& yaml, const Camera& camera)
+{
+  yaml << YAML::Key << "camera" << YAML::Value << YAML::BeginMap;
+  emit(yaml, "width", camera.width);
+  emit(yaml, "height", camera.height);
+  emit(yaml, "distortion_model", camera.distortion_model);
+  emit(yaml, "D", camera.distortion);
+  emit(yaml, "K", toList(camera.k));
+  emit(yaml, "R", toList(camera.rectification));
+  emit(yaml, "P", toList(camera.projection));
+  yaml << YAML::EndMap;
+}
+
+Camera cameraFromYaml(const YAML::Node& node)
+{
+  Camera camera;
+  camera.width = node["width"].as<int>();
+  camera.height = node["height"].as<int>();
+  camera.distortion_model = node["distortion_model"].as<std::string>();
+  camera.distortion = node["D"].as<std::vector<double>>();
+  fromList(node["K"], camera.k);
+  fromList(node["R"], camera.rectification);
+  fromList(node["P"], camera.projection);
+  return camera;
+}
+
+void emit(YAML::Emitter& yaml, const ViewPose& pose)
+{
+  yaml << YAML::Key << "pose" << YAML::Value << YAML::BeginMap;
+  emit(yaml, "frame", pose.frame);
+  emit(yaml, "position", toList(pose.position));
+  emit(yaml, "orientation", toList(pose.orientation.coeffs()));
+  yaml << YAML::Comment("x, y, z, w") << YAML::EndMap;
+}
+
+ViewPose poseFromYaml(const YAML::Node& node)
+{
+  ViewPose pose;
+  pose.frame = node["frame"].as<std::string>();
+  fromList(node["position"], pose.position);
+  fromList(node["orientation"], pose.orientation.coeffs());
+  return pose;
+}
+
+/** All of a view but its pixels. */
+std::string toYamlText(const StoredView& view, const std::string& image_file)
+{
+  const cv::Rect& region = view.region;
+  YAML::Emitter yaml;
+  yaml.SetSeqFormat(YAML::Flow);
+  yaml.SetDoublePrecision(std::numeric_limits<double>::max_digits10);
+  yaml << YAML::BeginMap;
+  emit(yaml, "format", FORMAT);
+  emit(yaml, "image", image_file);
+  emit(yaml, "stamp", view.stamp);
+  emit(yaml, "frame_id", view.frame_id);
+  emit(yaml, "region", std::vector<int>{ region.x, region.y, region.width, region.height });
+  yaml << YAML::Comment("x, y, width, height");
+  if (view.camera)
+  {
+    emit(yaml, *view.camera);
+  }
+  if (view.pose)
+  {
+    emit(yaml, *view.pose);
+  }
+  yaml << YAML::EndMap << YAML::Newline;
+  const std::string text(yaml.c_str(), yaml.size());
+  return text + std::string(CHECKSUM_KEY) + checksum(text) + "\n";
+}
+
+/** @throws Damage when the text is not, to the byte, what toYamlText() wrote. */
+YAML::Node parseYaml(const std::string& text)
+{
+  const std::size_t end = text.rfind(CHECKSUM_KEY);
+  if (end == std::string::npos ||
+      text.substr(end) != std::string(CHECKSUM_KEY) + checksum(std::string_view(text).substr(0, end)) + "\n")
+  {
+    throw Damage("its yaml file does not agree with the checksum in its last line");
+  }
+  const YAML::Node node = YAML::Load(text);
+  if (const int format = node["format"].as<int>(); format != FORMAT)
+  {
+    throw Damage("it has format " + std::to_string(format) + ", not " + std::to_string(FORMAT));
+  }
+  return node;
+}
+
+/** The view's fields but for image and name. */
+StoredView fieldsFromYaml(const YAML::Node& node)
+{
+  StoredView view;
+  view.stamp = node["stamp"].as<double>();
+  view.frame_id = node["frame_id"].as<std::string>();
+  Eigen::Vector4i region;
+  fromList(node["region"], region);
+  view.region = cv::Rect(region[0], region[1], region[2], region[3]);
+  if (node["camera"])
+  {
+    view.camera = cameraFromYaml(node["camera"]);
+  }
+  if (node["pose"])
+  {
+    view.pose = poseFromYaml(node["pose"]);
+  }
+  return view;
+}
+
+/** @throws Damage, or the error of the library that could not make sense of a file; empty when there is no such view. */
+std::optional<StoredView> readView(const fs::path& directory, const std::string& name)
+{
+  std::optional<std::string> text = readFile(yamlPath(directory, name));
+  while (text)
+  {
+    const YAML::Node node = parseYaml(*text);
+    const auto image_file = node["image"].as<std::string>();
+    if (std::optional<std::string> png = readFile(directory / image_file))
+    {
+      if (imageFileName(name, *png) != image_file)
+      {
+        throw Damage("its image " + image_file + " does not agree with the checksum in its name");
+      }
+      StoredView view = fieldsFromYaml(node);
+      view.name = name;
+      view.image = cv::imdecode(cv::Mat(1, static_cast<int>(png->size()), CV_8U, png->data()), cv::IMREAD_UNCHANGED);
+      check(view);
+      return view;
+    }
+    // The image may be gone because the view was saved anew since its yaml file was read.
+    std::optional<std::string> text_now = readFile(yamlPath(directory, name));
+    if (text_now == text)
+    {
+      throw Damage("its image " + image_file + " is missing");
+    }
+    text = std::move(text_now);
+  }
+  return std::nullopt;
+}
+
+[[noreturn]] void fail(const std::string& action, const std::string& name, const std::string& reason)
+{
+  throw ViewStoreError("cannot " + action + " view '" + name + "': " + reason);
+}
+
+void requireValidName(const std::string& action, const std::string& name)
+{
+  if (!isValidViewName(name))
+  {
+    fail(action, name.substr(0, MAX_NAME_LENGTH),
+         "a name is 1 to 64 letters, digits, '_' and '-', and starts with a letter or digit");
+  }
+}
+
+}  // namespace
+
+bool isValidViewName(const std::string& name)
+{
+  // Not std::isalnum(), which asks the locale.
+  const auto is_alphanumeric = [](char c) {
+    return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9');
+  };
+  return !name.empty() && name.size() <= MAX_NAME_LENGTH && is_alphanumeric(name[0]) &&
+         std::all_of(name.begin(), name.end(), [&](char c) { return is_alphanumeric(c) || c == '_' || c == '-'; });
+}
+
+ViewStore::ViewStore(std::filesystem::path directory) : directory_(std::move(directory))
+{
+}
+
+void ViewStore::save(const StoredView& view, bool overwrite) const
+{
+  requireValidName("save", view.name);
+  try
+  {
+    check(view);
+    fs::create_directories(directory_);
+    const fs::path yaml = yamlPath(directory_, view.name);
+    if (!overwrite && fs::exists(yaml))
+    {
+      fail("save", view.name, "there is one of that name");
+    }
+    std::vector<unsigned char> encoded;
+    cv::imencode(".png", view.image, encoded);
+    const std::string_view png(reinterpret_cast<const char*>(encoded.data()), encoded.size());
+    const std::string image_file = imageFileName(view.name, png);
+
+    replaceFile(directory_ / image_file, png);
+    replaceFile(yaml, toYamlText(view, image_file));
+    removeLeftovers(directory_, view.name, image_file);
+  }
+  catch (const ViewStoreError&)
+  {
+    throw;
+  }
+  catch (const std::exception& error)
+  {
+    fail("save", view.name, error.what());
+  }
+}
+
+StoredView ViewStore::load(const std::string& name) const
+{
+  requireValidName("load", name);
+  try
+  {
+    if (std::optional<StoredView> view = readView(directory_, name))
+    {
+      return *std::move(view);
+    }
+  }
+  catch (const std::exception& error)
+  {
+    fail("load", name, error.what());
+  }
+  fail("load", name, "there is none of that name");
+}
+
+std::string ViewStore::revision(const std::string& name) const
+{
+  requireValidName("load", name);
+  try
+  {
+    if (const std::optional<std::string> text = readFile(yamlPath(directory_, name)))
+    {
+      parseYaml(*text);
+      return checksum(*text);
+    }
+  }
+  catch (const std::exception& error)
+  {
+    fail("load", name, error.what());
+  }
+  fail("load", name, "there is none of that name");
+}
+
+ViewStore::Listing ViewStore::list() const
+{
+  Listing listing;
+  std::vector<std::string> names;
+  try
+  {
+    if (!fs::exists(directory_))
+    {
+      return listing;
+    }
+    for (const fs::directory_entry& entry : fs::directory_iterator(directory_))
+    {
+      if (entry.path().extension() == ".yaml" && isValidViewName(entry.path().stem().string()))
+      {
+        names.push_back(entry.path().stem().string());
+      }
+    }
+  }
+  catch (const fs::filesystem_error& error)
+  {
+    throw ViewStoreError(std::string("cannot list views: ") + error.what());
+  }
+  std::sort(names.begin(), names.end());
+  for (const std::string& name : names)
+  {
+    try
+    {
+      if (readView(directory_, name))  // else it was removed meanwhile
+      {
+        listing.names.push_back(name);
+      }
+    }
+    catch (const std::exception& error)
+    {
+      listing.damaged.push_back({ name, error.what() });
+    }
+  }
+  return listing;
+}
+
+void ViewStore::remove(const std::string& name) const
+{
+  requireValidName("remove", name);
+  try
+  {
+    if (!fs::remove(yamlPath(directory_, name)))
+    {
+      fail("remove", name, "there is none of that name");
+    }
+    syncDirectory(directory_);
+    removeLeftovers(directory_, name, "");
+  }
+  catch (const std::system_error& error)
+  {
+    fail("remove", name, error.what());
+  }
+}
+
+}  // namespace view_servo

@@ -1,0 +1,327 @@
+// Copyright (c) 2026, the view_servo authors
+// SPDX-License-Identifier: BSD-3-Clause
+#include "view_servo/ros/conversions.h"
+
+#include "view_servo/views/image_io.h"
+
+#include <gtest/gtest.h>
+#include <opencv2/core.hpp>
+#include <opencv2/imgproc.hpp>
+#include <sensor_msgs/image_encodings.h>
+
+#include <array>
+#include <cmath>
+#include <cstdint>
+#include <limits>
+#include <string>
+#include <utility>
+#include <vector>
+
+namespace view_servo
+{
+namespace
+{
+namespace enc = sensor_msgs::image_encodings;
+
+sensor_msgs::CameraInfo exampleInfo()
+{
+  sensor_msgs::CameraInfo info;
+  info.width = 640;
+  info.height = 480;
+  info.distortion_model = "plumb_bob";
+  info.D = { -0.2, 0.05, 0.001, -0.002, 0.0 };
+  info.K = { 500.0, 0.0, 322.0, 0.0, 510.0, 238.0, 0.0, 0.0, 1.0 };
+  info.R = { 1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0 };
+  info.P = { 480.0, 0.0, 320.0, -12.0, 0.0, 490.0, 240.0, 0.0, 0.0, 0.0, 1.0, 0.0 };
+  return info;
+}
+
+/** A smooth picture with colour, so that demosaicing and grey conversion are well defined. */
+cv::Mat examplePicture()
+{
+  cv::Mat picture(48, 64, CV_8UC3);
+  for (int v = 0; v < picture.rows; ++v)
+  {
+    for (int u = 0; u < picture.cols; ++u)
+    {
+      picture.at<cv::Vec3b>(v, u) = cv::Vec3b(cv::saturate_cast<uchar>(2 * u), cv::saturate_cast<uchar>(3 * v),
+                                              cv::saturate_cast<uchar>(40 + u + v));
+    }
+  }
+  return picture;
+}
+
+double largestDifference(const cv::Mat& a, const cv::Mat& b)
+{
+  cv::Mat difference;
+  cv::absdiff(a, b, difference);
+  double largest = 0.0;
+  cv::minMaxLoc(difference.reshape(1), nullptr, &largest);
+  return largest;
+}
+
+std::string errorOf(const sensor_msgs::Image& image)
+{
+  try
+  {
+    toGrey(image, "the image");
+  }
+  catch (const ImageError& error)
+  {
+    return error.what();
+  }
+  return "";
+}
+
+TEST(CameraConversion, KeepsEveryFieldThereAndBack)
+{
+  const sensor_msgs::CameraInfo info = exampleInfo();
+  const Camera camera = toCamera(info);
+  EXPECT_TRUE(camera.calibrated());
+  EXPECT_EQ(camera.width, 640);
+  EXPECT_EQ(camera.height, 480);
+  EXPECT_DOUBLE_EQ(camera.k(0, 2), 322.0);
+  EXPECT_DOUBLE_EQ(camera.k(1, 1), 510.0);
+
+  std_msgs::Header header;
+  header.frame_id = "camera_optical_frame";
+  const sensor_msgs::CameraInfo back = toCameraInfo(camera, header);
+  EXPECT_EQ(back.header.frame_id, "camera_optical_frame");
+  EXPECT_EQ(back.width, info.width);
+  EXPECT_EQ(back.height, info.height);
+  EXPECT_EQ(back.distortion_model, info.distortion_model);
+  EXPECT_EQ(back.D, info.D);
+  EXPECT_EQ(back.K, info.K);
+  EXPECT_EQ(back.R, info.R);
+  EXPECT_EQ(back.P, info.P);
+}
+
+TEST(CameraConversion, WorksBinningAndRegionIntoTheIntrinsics)
+{
+  sensor_msgs::CameraInfo info = exampleInfo();
+  info.roi.x_offset = 100;
+  info.roi.y_offset = 60;
+  info.roi.width = 400;
+  info.roi.height = 300;
+  info.binning_x = 2;
+  info.binning_y = 2;
+  const Camera camera = toCamera(info);
+  EXPECT_EQ(camera.width, 200);
+  EXPECT_EQ(camera.height, 150);
+  EXPECT_DOUBLE_EQ(camera.k(0, 0), 250.0);
+  EXPECT_DOUBLE_EQ(camera.k(0, 2), (322.0 - 100.0) / 2.0);
+  EXPECT_DOUBLE_EQ(camera.k(1, 2), (238.0 - 60.0) / 2.0);
+}
+
+TEST(CameraConversion, TellsAnUncalibratedCamera)
+{
+  sensor_msgs::CameraInfo info;
+  info.width = 640;
+  info.height = 480;
+  EXPECT_FALSE(isCalibrated(info));
+  EXPECT_FALSE(toCamera(info).calibrated());
+  EXPECT_TRUE(isCalibrated(exampleInfo()));
+}
+
+TEST(ImageConversion, TurnsEveryEncodingIntoTheSameGrey)
+{
+  const cv::Mat bgr = examplePicture();
+  cv::Mat grey;
+  cv::cvtColor(bgr, grey, cv::COLOR_BGR2GRAY);
+  const auto convert = [&](int code) {
+    cv::Mat result;
+    cv::cvtColor(bgr, result, code);
+    return result;
+  };
+  const auto wide = [](const cv::Mat& image) {
+    cv::Mat result;
+    image.convertTo(result, CV_16U, 257.0);
+    return result;
+  };
+  const std::vector<std::pair<std::string, cv::Mat>> images = {
+    { enc::MONO8, grey },
+    { enc::TYPE_8UC1, grey },
+    { enc::MONO16, wide(grey) },
+    { enc::TYPE_16UC1, wide(grey) },
+    { enc::BGR8, bgr },
+    { enc::TYPE_8UC3, bgr },
+    { enc::RGB8, convert(cv::COLOR_BGR2RGB) },
+    { enc::BGRA8, convert(cv::COLOR_BGR2BGRA) },
+    { enc::RGBA8, convert(cv::COLOR_BGR2RGBA) },
+    { enc::BGR16, wide(bgr) },
+    { enc::RGB16, wide(convert(cv::COLOR_BGR2RGB)) },
+    { enc::BGRA16, wide(convert(cv::COLOR_BGR2BGRA)) },
+    { enc::RGBA16, wide(convert(cv::COLOR_BGR2RGBA)) },
+  };
+  for (const auto& [encoding, image] : images)
+  {
+    const cv::Mat converted = toGrey(toImage(image, encoding, {}), encoding);
+    ASSERT_EQ(converted.type(), CV_8UC1) << encoding;
+    ASSERT_EQ(converted.size(), grey.size()) << encoding;
+    EXPECT_LE(largestDifference(converted, grey), 1.0) << encoding;
+  }
+}
+
+TEST(ImageConversion, DemosaicsBayerPatterns)
+{
+  const cv::Mat bgr = examplePicture();
+  cv::Mat grey;
+  cv::cvtColor(bgr, grey, cv::COLOR_BGR2GRAY);
+  // Channels (of BGR) at the even and odd columns of even rows, then of odd rows.
+  const std::vector<std::pair<std::string, std::array<int, 4>>> patterns = {
+    { enc::BAYER_RGGB8, { 2, 1, 1, 0 } },
+    { enc::BAYER_BGGR8, { 0, 1, 1, 2 } },
+    { enc::BAYER_GBRG8, { 1, 0, 2, 1 } },
+    { enc::BAYER_GRBG8, { 1, 2, 0, 1 } },
+  };
+  for (const auto& [encoding, channels] : patterns)
+  {
+    cv::Mat mosaic(bgr.size(), CV_8UC1);
+    for (int v = 0; v < bgr.rows; ++v)
+    {
+      for (int u = 0; u < bgr.cols; ++u)
+      {
+        const int channel = channels[static_cast<std::size_t>(2 * (v % 2) + u % 2)];
+        mosaic.at<uchar>(v, u) = bgr.at<cv::Vec3b>(v, u)[channel];
+      }
+    }
+    const cv::Mat converted = toGrey(toImage(mosaic, encoding, {}), encoding);
+    const cv::Rect inside(2, 2, bgr.cols - 4, bgr.rows - 4);
+    EXPECT_LE(largestDifference(converted(inside), grey(inside)), 3.0) << encoding;
+  }
+}
+
+TEST(ImageConversion, DoesNotReferToTheMessage)
+{
+  sensor_msgs::Image image = toImage(cv::Mat(20, 20, CV_8UC1, cv::Scalar(7)), enc::MONO8, {});
+  const cv::Mat grey = toGrey(image, "the image");
+  image.data[0] = 99;
+  EXPECT_EQ(grey.at<uchar>(0, 0), 7);
+}
+
+TEST(ImageConversion, NamesWhatItCannotUse)
+{
+  const sensor_msgs::Image good = toImage(cv::Mat(20, 20, CV_8UC1, cv::Scalar(7)), enc::MONO8, {});
+
+  sensor_msgs::Image image = good;
+  image.encoding = "jpeg";
+  EXPECT_NE(errorOf(image).find("'the image': encoding 'jpeg'"), std::string::npos) << errorOf(image);
+
+  image = good;
+  image.data.resize(10);
+  EXPECT_NE(errorOf(image).find("'the image': 10 bytes"), std::string::npos) << errorOf(image);
+
+  image = good;
+  image.step = 1u << 31;  // with 20 rows, the product wraps to 0 in 32 bits
+  image.data.clear();
+  EXPECT_NE(errorOf(image).find("'the image': 0 bytes"), std::string::npos) << errorOf(image);
+
+  image = good;
+  image.step = 5;
+  image.data.resize(100);
+  EXPECT_NE(errorOf(image), "");
+
+  image = good;
+  image.width = 10000;
+  image.height = 10000;
+  EXPECT_NE(errorOf(image).find("10000 x 10000"), std::string::npos) << errorOf(image);
+
+  EXPECT_NE(errorOf(toImage(cv::Mat(20, 20, CV_32FC1, cv::Scalar(7)), enc::TYPE_32FC1, {})), "");
+  EXPECT_NE(errorOf(toImage(cv::Mat(1, 1, CV_8UC1, cv::Scalar(7)), enc::MONO8, {})), "");
+  EXPECT_NE(errorOf(sensor_msgs::Image()), "");
+}
+
+TEST(RegionConversion, RefusesWhatLeavesTheImage)
+{
+  const cv::Size size(640, 480);
+  sensor_msgs::RegionOfInterest roi;
+  EXPECT_TRUE(toRect(roi, size).empty());
+  roi.x_offset = 10;
+  roi.y_offset = 20;
+  roi.width = 630;
+  roi.height = 460;
+  EXPECT_EQ(toRect(roi, size), cv::Rect(10, 20, 630, 460));
+  EXPECT_EQ(toRegionOfInterest(toRect(roi, size)), roi);
+  roi.width = 631;
+  EXPECT_THROW(toRect(roi, size), ImageError);
+  roi.x_offset = std::numeric_limits<std::uint32_t>::max();
+  EXPECT_THROW(toRect(roi, size), ImageError);
+  roi.width = 0;
+  EXPECT_THROW(toRect(roi, size), ImageError);
+}
+
+TEST(PoseConversion, KeepsPositionAndOrientation)
+{
+  geometry_msgs::TransformStamped transform;
+  transform.header.frame_id = "odom";
+  transform.child_frame_id = "camera_optical_frame";
+  transform.transform.translation.x = 1.0;
+  transform.transform.translation.y = -2.0;
+  transform.transform.translation.z = 0.5;
+  transform.transform.rotation.x = 0.5;
+  transform.transform.rotation.y = -0.5;
+  transform.transform.rotation.z = 0.5;
+  transform.transform.rotation.w = -0.5;
+
+  const geometry_msgs::PoseStamped pose = toPoseStamped(toViewPose(transform), ros::Time(3.0));
+  EXPECT_EQ(pose.header.frame_id, "odom");
+  EXPECT_EQ(pose.header.stamp, ros::Time(3.0));
+  EXPECT_DOUBLE_EQ(pose.pose.position.x, 1.0);
+  EXPECT_DOUBLE_EQ(pose.pose.position.y, -2.0);
+  EXPECT_DOUBLE_EQ(pose.pose.position.z, 0.5);
+  EXPECT_EQ(pose.pose.orientation, transform.transform.rotation);
+}
+
+TEST(MatchConversion, CopiesMatchesAndWritesTheMatrixByRows)
+{
+  ViewMatch match;
+  match.outcome = MatchOutcome::MATCHED;
+  match.matrix << 1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0, 8.0, 1.0;
+  match.matches = { { { { 1.0, 2.0 }, { 3.0, 4.0 } }, 0.5, true }, { { { 5.0, 6.0 }, { 7.0, 8.0 } }, 0.25, false } };
+  match.inliers = 1;
+  match.rms_error = 0.7;
+
+  const std::vector<PointMatch> points = toPointMatches(match.matches);
+  ASSERT_EQ(points.size(), 2u);
+  EXPECT_EQ(points[0].reference_x, 1.0);
+  EXPECT_EQ(points[0].reference_y, 2.0);
+  EXPECT_EQ(points[0].current_x, 3.0);
+  EXPECT_EQ(points[0].current_y, 4.0);
+  EXPECT_EQ(points[0].score, 0.5);
+  EXPECT_TRUE(points[0].inlier);
+  EXPECT_FALSE(points[1].inlier);
+
+  std_msgs::Header header;
+  header.stamp = ros::Time(5.0);
+  header.frame_id = "camera_optical_frame";
+  const Homography homography = toHomography(match, "desk", header);
+  EXPECT_EQ(homography.header, header);
+  EXPECT_EQ(homography.view, "desk");
+  EXPECT_EQ(homography.state, Homography::TRACKING);
+  EXPECT_TRUE(homography.valid);
+  EXPECT_EQ(homography.h[1], 2.0);
+  EXPECT_EQ(homography.h[3], 4.0);
+  EXPECT_EQ(homography.matches, 2);
+  EXPECT_EQ(homography.inliers, 1);
+  EXPECT_EQ(homography.rms_error, 0.7);
+  EXPECT_TRUE(std::isnan(homography.distance));
+  EXPECT_TRUE(std::isnan(homography.normal.z));
+  EXPECT_TRUE(std::isnan(homography.rotation.w));
+}
+
+TEST(MatchConversion, HasNoNumbersWithoutGeometry)
+{
+  ViewMatch match;
+  match.outcome = MatchOutcome::NO_GEOMETRY;
+  match.matrix.setIdentity();
+  match.inliers = 3;
+  const Homography homography = toHomography(match, "desk", std_msgs::Header());
+  EXPECT_EQ(homography.state, Homography::SEARCHING);
+  EXPECT_FALSE(homography.valid);
+  EXPECT_EQ(homography.inliers, 0);
+  EXPECT_TRUE(std::isnan(homography.h[0]));
+  EXPECT_TRUE(std::isnan(homography.rms_error));
+}
+
+}  // namespace
+}  // namespace view_servo

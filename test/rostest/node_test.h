@@ -1,0 +1,275 @@
+// Copyright (c) 2026, the view_servo authors
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include "view_servo/ros/conversions.h"
+
+#include <Eigen/Core>
+#include <Eigen/LU>
+#include <gtest/gtest.h>
+#include <opencv2/core.hpp>
+#include <opencv2/core/eigen.hpp>
+#include <opencv2/imgproc.hpp>
+#include <ros/ros.h>
+#include <sensor_msgs/CameraInfo.h>
+#include <sensor_msgs/Image.h>
+#include <sensor_msgs/image_encodings.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstdint>
+#include <cstdlib>
+#include <deque>
+#include <filesystem>
+#include <functional>
+#include <mutex>
+#include <optional>
+#include <stdexcept>
+#include <string>
+
+namespace view_servo
+{
+namespace test
+{
+/** @file What the tests of nodes share: pictures with a known homography, a camera, waiting with a deadline. */
+
+constexpr double DEADLINE = 20.0;  // [s]; nothing here takes nearly as long on an idle machine
+
+/** Calls `step` and asks `predicate`, often, until it holds or the deadline has passed. Wall time. */
+inline bool waitUntil(const std::function<bool()>& predicate, const std::function<void()>& step = nullptr)
+{
+  const ros::WallTime deadline = ros::WallTime::now() + ros::WallDuration(DEADLINE);
+  while (ros::ok() && ros::WallTime::now() < deadline)
+  {
+    if (step)
+    {
+      step();
+    }
+    if (predicate())
+    {
+      return true;
+    }
+    ros::WallDuration(0.02).sleep();
+  }
+  return false;
+}
+
+/** Waits for a service, on wall time. */
+inline bool waitForService(const std::string& name)
+{
+  return waitUntil([&] { return ros::service::exists(name, false); });
+}
+
+/** Where a node keeps its views. */
+inline std::filesystem::path viewsDir(const std::string& node)
+{
+  std::string directory;
+  if (!ros::param::get(node + "/views_dir", directory))
+  {
+    throw std::runtime_error(node + " has no views_dir");
+  }
+  return directory;
+}
+
+/** Removes a directory of views that a launch file made up. */
+inline void removeViews(const std::string& node)
+{
+  std::filesystem::remove_all(viewsDir(node));
+}
+
+/** The messages of a topic; safe to ask while spinner threads receive. */
+template <typename Message>
+class Recorder
+{
+public:
+  Recorder(const std::string& topic)
+  {
+    subscriber_ = ros::NodeHandle().subscribe<Message>(topic, 100, &Recorder::callback, this);
+  }
+
+  std::deque<Message> messages() const
+  {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    return messages_;
+  }
+
+  std::optional<Message> last() const
+  {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    return messages_.empty() ? std::nullopt : std::optional<Message>(messages_.back());
+  }
+
+private:
+  void callback(const boost::shared_ptr<const Message>& message)
+  {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    messages_.push_back(*message);
+  }
+
+  mutable std::mutex mutex_;
+  std::deque<Message> messages_;
+  ros::Subscriber subscriber_;
+};
+
+/** A directory that goes with the object. */
+class TemporaryDirectory
+{
+public:
+  TemporaryDirectory()
+  {
+    std::string name = (std::filesystem::temp_directory_path() / "view_servo_XXXXXX").string();
+    if (mkdtemp(name.data()) == nullptr)
+    {
+      throw std::runtime_error("no temporary directory");
+    }
+    path_ = name;
+  }
+  ~TemporaryDirectory()
+  {
+    std::filesystem::remove_all(path_);
+  }
+  TemporaryDirectory(const TemporaryDirectory&) = delete;
+  TemporaryDirectory& operator=(const TemporaryDirectory&) = delete;
+
+  const std::filesystem::path& path() const
+  {
+    return path_;
+  }
+
+private:
+  std::filesystem::path path_;
+};
+
+/** A textured plane, another one for each seed: patches of many sizes and greys on a slowly varying ground. */
+inline cv::Mat makePicture(std::uint64_t seed, const cv::Size& size = cv::Size(480, 360))
+{
+  cv::RNG rng(seed);
+  cv::Mat picture(size, CV_8UC1, cv::Scalar(128));
+  for (int i = 0; i < 220; ++i)
+  {
+    const cv::Point2f centre(rng.uniform(0.0F, static_cast<float>(size.width)),
+                             rng.uniform(0.0F, static_cast<float>(size.height)));
+    const cv::Size2f sides(rng.uniform(8.0F, 70.0F), rng.uniform(8.0F, 70.0F));
+    const cv::RotatedRect patch(centre, sides, rng.uniform(0.0F, 180.0F));
+    cv::Point2f corners[4];
+    patch.points(corners);
+    std::vector<cv::Point> polygon(corners, corners + 4);
+    cv::fillConvexPoly(picture, polygon, cv::Scalar(rng.uniform(0, 256)), cv::LINE_AA);
+  }
+  cv::Mat noise(size, CV_8UC1);
+  rng.fill(noise, cv::RNG::NORMAL, 20.0, 4.0);
+  cv::Mat result;
+  cv::GaussianBlur(picture + noise - cv::Scalar(20), result, cv::Size(), 0.8);
+  return result;
+}
+
+/** Reference -> current: a turn, a change of size and some perspective. */
+inline Eigen::Matrix3d exampleHomography()
+{
+  Eigen::Matrix3d h;
+  h << 0.87, -0.12, 50.0, 0.09, 0.93, -5.0, -2e-4, 1e-4, 1.0;
+  return h;
+}
+
+/** The picture seen through `h`, on grey ground, under another light. */
+inline cv::Mat warped(const cv::Mat& picture, const Eigen::Matrix3d& h)
+{
+  cv::Mat matrix;
+  cv::eigen2cv(h, matrix);
+  cv::Mat result;
+  cv::warpPerspective(picture, result, matrix, picture.size(), cv::INTER_LINEAR, cv::BORDER_CONSTANT, cv::Scalar(120));
+  result.convertTo(result, -1, 0.8, 12.0);
+  return result;
+}
+
+template <typename Array>
+Eigen::Matrix3d toMatrix(const Array& rows)
+{
+  return Eigen::Map<const Eigen::Matrix<double, 3, 3, Eigen::RowMajor>>(rows.data());
+}
+
+/** Mean distance between the picture's corners under the two homographies [px]; NaN for a NaN matrix. */
+inline double cornerError(const Eigen::Matrix3d& estimated, const Eigen::Matrix3d& truth,
+                          const cv::Size& size = cv::Size(480, 360))
+{
+  double sum = 0.0;
+  for (const double u : { 0.0, size.width - 1.0 })
+  {
+    for (const double v : { 0.0, size.height - 1.0 })
+    {
+      const Eigen::Vector3d corner(u, v, 1.0);
+      const Eigen::Vector3d a = estimated * corner;
+      const Eigen::Vector3d b = truth * corner;
+      sum += (a.head<2>() / a.z() - b.head<2>() / b.z()).norm();
+    }
+  }
+  return sum / 4.0;
+}
+
+inline sensor_msgs::Image toMono8(const cv::Mat& image)
+{
+  return toImage(image, sensor_msgs::image_encodings::MONO8, std_msgs::Header());
+}
+
+/** Publishes images with their calibration, as a camera's driver does. */
+class FakeCamera
+{
+public:
+  explicit FakeCamera(const std::string& name) : frame_id(name + "_optical_frame")
+  {
+    ros::NodeHandle nh;
+    image_publisher_ = nh.advertise<sensor_msgs::Image>(name + "/image_raw", 10);
+    info_publisher_ = nh.advertise<sensor_msgs::CameraInfo>(name + "/camera_info", 10);
+  }
+
+  bool waitForSubscribers(std::uint32_t count) const
+  {
+    return waitUntil([&] {
+      return image_publisher_.getNumSubscribers() >= count && info_publisher_.getNumSubscribers() >= count;
+    });
+  }
+
+  void publish(const cv::Mat& image, const ros::Time& stamp) const
+  {
+    std_msgs::Header header;
+    header.stamp = stamp;
+    header.frame_id = frame_id;
+    sensor_msgs::CameraInfo info;
+    info.header = header;
+    info.width = static_cast<std::uint32_t>(image.cols);
+    info.height = static_cast<std::uint32_t>(image.rows);
+    info.distortion_model = "plumb_bob";
+    info.D.assign(5, 0.0);
+    const double f = calibrated ? 500.0 : 0.0;
+    info.K = { f, 0.0, 240.0, 0.0, f, 180.0, 0.0, 0.0, 1.0 };
+    info.R = { 1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0 };
+    info.P = { f, 0.0, 240.0, 0.0, 0.0, f, 180.0, 0.0, 0.0, 0.0, 1.0, 0.0 };
+    if (!calibrated)
+    {
+      info.K.fill(0.0);
+    }
+    info_publisher_.publish(info);
+    image_publisher_.publish(toImage(image, sensor_msgs::image_encodings::MONO8, header));
+  }
+
+  std::string frame_id;
+  bool calibrated = true;
+
+private:
+  ros::Publisher image_publisher_;
+  ros::Publisher info_publisher_;
+};
+
+/** main() of a test of nodes. */
+inline int runTests(int argc, char** argv, const std::string& name)
+{
+  ::testing::InitGoogleTest(&argc, argv);
+  ros::init(argc, argv, name);
+  ros::NodeHandle keeps_ros_running;
+  ros::AsyncSpinner spinner(2);
+  spinner.start();
+  return RUN_ALL_TESTS();
+}
+
+}  // namespace test
+}  // namespace view_servo

@@ -1,0 +1,441 @@
+// Copyright (c) 2026, the view_servo authors
+// SPDX-License-Identifier: BSD-3-Clause
+// Runs the program itself, as a shell would.
+#include "support/temporary_directory.h"
+
+#include <gtest/gtest.h>
+#include <nlohmann/json.hpp>
+#include <opencv2/core.hpp>
+#include <opencv2/imgcodecs.hpp>
+#include <opencv2/imgproc.hpp>
+
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstdlib>
+#include <filesystem>
+#include <fstream>
+#include <iterator>
+#include <string>
+#include <vector>
+
+using nlohmann::json;
+using view_servo::test::TemporaryDirectory;
+
+namespace
+{
+/** Blotches of several sizes, as unlike from place to place as a printed poster. */
+cv::Mat texture(int seed, const cv::Size& size = cv::Size(480, 360))
+{
+  cv::RNG rng(static_cast<std::uint64_t>(seed));
+  cv::Mat sum = cv::Mat::zeros(size, CV_32FC1);
+  for (const double sigma : { 2.0, 5.0, 12.0 })
+  {
+    cv::Mat noise(size, CV_32FC1);
+    rng.fill(noise, cv::RNG::NORMAL, 0.0, 1.0);
+    cv::GaussianBlur(noise, noise, cv::Size(), sigma);
+    cv::normalize(noise, noise, 0.0, 1.0, cv::NORM_MINMAX);
+    sum += noise;
+  }
+  cv::Mat grey;
+  cv::normalize(sum, sum, 0.0, 255.0, cv::NORM_MINMAX);
+  sum.convertTo(grey, CV_8U);
+  return grey;
+}
+
+/** Reference -> current: a plane seen from another side. */
+const cv::Matx33d TRUE_HOMOGRAPHY(0.85, -0.15, 60.0, 0.12, 0.9, 5.0, 2e-4, 1e-4, 1.0);
+
+cv::Mat warped(const cv::Mat& image, const cv::Size& size = cv::Size(480, 360))
+{
+  cv::Mat result;
+  cv::warpPerspective(image, result, TRUE_HOMOGRAPHY, size, cv::INTER_LINEAR, cv::BORDER_CONSTANT, cv::Scalar(128));
+  return result;
+}
+
+struct Outcome
+{
+  int status;
+  std::string out;
+  std::string err;
+};
+
+class MatchImages : public ::testing::Test
+{
+protected:
+  MatchImages()
+  {
+    reference_ = write("reference.png", texture(1));
+    current_ = write("current.png", warped(texture(1)));
+  }
+
+  std::string path(const std::string& name) const
+  {
+    return directory_.path() / name;
+  }
+
+  std::string write(const std::string& name, const cv::Mat& image) const
+  {
+    EXPECT_TRUE(cv::imwrite(path(name), image));
+    return path(name);
+  }
+
+  std::string writeText(const std::string& name, const std::string& text) const
+  {
+    std::ofstream(path(name), std::ios::binary) << text;
+    return path(name);
+  }
+
+  Outcome run(const std::vector<std::string>& arguments) const
+  {
+    std::string command = "'" MATCH_IMAGES_BINARY "'";
+    for (const std::string& argument : arguments)
+    {
+      command += " '" + argument + "'";
+    }
+    command += " > '" + path("out") + "' 2> '" + path("err") + "' < /dev/null";
+    const int status = std::system(command.c_str());
+    return { WIFEXITED(status) ? WEXITSTATUS(status) : -1, readText("out"), readText("err") };
+  }
+
+  Outcome match(const std::string& reference, const std::string& current,
+                const std::vector<std::string>& more = {}) const
+  {
+    std::vector<std::string> arguments{ "points", reference, current };
+    arguments.insert(arguments.end(), more.begin(), more.end());
+    return run(arguments);
+  }
+
+  json matchJson(const std::string& reference, const std::string& current, int expected_status,
+                 std::vector<std::string> more = {}) const
+  {
+    more.emplace_back("--json");
+    const Outcome outcome = match(reference, current, more);
+    EXPECT_EQ(outcome.status, expected_status) << outcome.out;
+    EXPECT_EQ(outcome.err, "");
+    return json::parse(outcome.out);
+  }
+
+  /** Status 2, and nothing but one line, which names `culprit`. */
+  static void expectBadInput(const Outcome& outcome, const std::string& culprit)
+  {
+    EXPECT_EQ(outcome.status, 2);
+    EXPECT_EQ(outcome.out, "");
+    EXPECT_EQ(std::count(outcome.err.begin(), outcome.err.end(), '\n'), 1) << outcome.err;
+    EXPECT_NE(outcome.err.find(culprit), std::string::npos) << outcome.err;
+  }
+
+  std::string reference_;
+  std::string current_;
+
+private:
+  std::string readText(const std::string& name) const
+  {
+    std::ifstream file(path(name), std::ios::binary);
+    return std::string(std::istreambuf_iterator<char>(file), {});
+  }
+
+  TemporaryDirectory directory_;
+};
+
+/** Mean distance of the corners of an image under a result's matrix and the truth [px]. */
+double cornerError(const json& result, const cv::Size& size = cv::Size(480, 360))
+{
+  cv::Matx33d h;
+  for (int i = 0; i < 9; ++i)
+  {
+    h.val[i] = result.at("matrix").at(static_cast<std::size_t>(i)).get<double>();
+  }
+  const double right = size.width - 1.0;
+  const double bottom = size.height - 1.0;
+  std::vector<cv::Point2d> corners{ { 0.0, 0.0 }, { right, 0.0 }, { right, bottom }, { 0.0, bottom } };
+  std::vector<cv::Point2d> found;
+  std::vector<cv::Point2d> wanted;
+  cv::perspectiveTransform(corners, found, h);
+  cv::perspectiveTransform(corners, wanted, TRUE_HOMOGRAPHY);
+  double sum = 0.0;
+  for (std::size_t i = 0; i < corners.size(); ++i)
+  {
+    sum += cv::norm(found[i] - wanted[i]);
+  }
+  return sum / static_cast<double>(corners.size());
+}
+
+}  // namespace
+
+TEST_F(MatchImages, findsAHomography)
+{
+  const Outcome outcome = match(reference_, current_);
+  EXPECT_EQ(outcome.status, 0);
+  EXPECT_EQ(outcome.err, "");
+  EXPECT_NE(outcome.out.find("homography"), std::string::npos) << outcome.out;
+  EXPECT_LT(cornerError(matchJson(reference_, current_, 0)), 1.0);
+}
+
+TEST_F(MatchImages, jsonHasEveryField)
+{
+  const json result = matchJson(reference_, current_, 0);
+  EXPECT_EQ(result.at("success"), true);
+  EXPECT_TRUE(result.at("message").is_string());
+  EXPECT_EQ(result.at("model"), "homography");
+  EXPECT_EQ(result.at("matrix").size(), 9U);
+  EXPECT_EQ(result.at("matrix").at(8), 1.0);
+  EXPECT_GT(result.at("rms_error").get<double>(), 0.0);
+  EXPECT_GT(result.at("elapsed_ms").at("total").get<double>(), 0.0);
+  EXPECT_GT(result.at("elapsed_ms").size(), 3U);
+  for (const json& time : result.at("elapsed_ms"))
+  {
+    EXPECT_TRUE(time.is_number());
+  }
+
+  int inliers = 0;
+  int close_inliers = 0;
+  double last_score = INFINITY;
+  for (const json& pair : result.at("matches"))
+  {
+    EXPECT_LE(pair.at("score").get<double>(), last_score) << "best first";
+    last_score = pair.at("score");
+    ASSERT_EQ(pair.at("reference").size(), 2U);
+    ASSERT_EQ(pair.at("current").size(), 2U);
+    if (pair.at("inlier").get<bool>())
+    {
+      const std::vector<cv::Point2d> from{ { pair["reference"][0], pair["reference"][1] } };
+      const cv::Point2d to(pair["current"][0], pair["current"][1]);
+      std::vector<cv::Point2d> mapped;
+      cv::perspectiveTransform(from, mapped, TRUE_HOMOGRAPHY);
+      close_inliers += cv::norm(mapped[0] - to) < 4.0 ? 1 : 0;
+      ++inliers;
+    }
+  }
+  EXPECT_EQ(result.at("inliers"), inliers);
+  EXPECT_GT(inliers, 50);
+  EXPECT_GT(close_inliers, 0.95 * inliers);
+}
+
+TEST_F(MatchImages, givesTheSameBytesAgain)
+{
+  json first = matchJson(reference_, current_, 0);
+  json second = matchJson(reference_, current_, 0);
+  json one_thread = matchJson(reference_, current_, 0, { "--threads", "1" });
+  for (json* result : { &first, &second, &one_thread })
+  {
+    result->erase("elapsed_ms");
+  }
+  EXPECT_EQ(first.dump(), second.dump());
+  EXPECT_EQ(first.dump(), one_thread.dump());
+}
+
+TEST_F(MatchImages, findsAFundamentalMatrix)
+{
+  // Two planes at different depths: the lower half moves twice as far as the upper one.
+  const cv::Mat scene = texture(1);
+  cv::Mat moved = scene.clone();
+  for (int half = 0; half < 2; ++half)
+  {
+    const cv::Rect rows(0, half * 180, 480, 180);
+    const cv::Matx23d shift(1.0, 0.0, half == 0 ? 12.0 : 24.0, 0.0, 1.0, 0.0);
+    cv::warpAffine(scene(rows), moved(rows), shift, rows.size(), cv::INTER_LINEAR, cv::BORDER_REFLECT);
+  }
+  const json result = matchJson(reference_, write("moved.png", moved), 0, { "--model", "fundamental" });
+  EXPECT_EQ(result.at("model"), "fundamental");
+  double squares = 0.0;
+  for (const json& entry : result.at("matrix"))
+  {
+    squares += entry.get<double>() * entry.get<double>();
+  }
+  EXPECT_NEAR(squares, 1.0, 1e-9);
+}
+
+TEST_F(MatchImages, comparesWithTheTruth)
+{
+  cv::FileStorage storage(path("truth.xml"), cv::FileStorage::WRITE);
+  storage << "H" << cv::Mat(TRUE_HOMOGRAPHY);
+  storage.release();
+  writeText("truth.txt", "0.85 -0.15 60\n0.12 0.9 5\n2e-4 1e-4 1\n");
+  for (const std::string name : { "truth.xml", "truth.txt" })
+  {
+    const json result = matchJson(reference_, current_, 0, { "--truth", path(name) });
+    EXPECT_NEAR(result.at("mean_corner_error").get<double>(), cornerError(result), 1e-6) << name;
+  }
+  EXPECT_NE(match(reference_, current_, { "--truth", path("truth.txt") }).out.find("mean corner error"),
+            std::string::npos);
+
+  writeText("short.txt", "1 0 0 0 1 0");
+  expectBadInput(match(reference_, current_, { "--truth", path("short.txt") }), path("short.txt"));
+  expectBadInput(match(reference_, current_, { "--truth", path("none.xml") }), path("none.xml"));
+  expectBadInput(match(reference_, current_, { "--truth", path("truth.txt"), "--model", "fundamental" }), "--truth");
+}
+
+TEST_F(MatchImages, writesAnOverlay)
+{
+  const Outcome outcome = match(reference_, current_, { "--overlay", path("overlay.png") });
+  EXPECT_EQ(outcome.status, 0);
+  EXPECT_NE(outcome.out.find(path("overlay.png")), std::string::npos);
+  const cv::Mat picture = cv::imread(path("overlay.png"));
+  EXPECT_GE(picture.cols, 960);
+  EXPECT_GT(picture.rows, 360);
+
+  expectBadInput(match(reference_, current_, { "--overlay", path("none/overlay.png") }), path("none/overlay.png"));
+  expectBadInput(match(reference_, current_, { "--overlay", path("overlay.xyz") }), path("overlay.xyz"));
+  expectBadInput(match(reference_, current_, { "--overlay", path("overlay") }), path("overlay"));
+}
+
+TEST_F(MatchImages, takesParameters)
+{
+  const json few = matchJson(reference_, current_, 0, { "--set", "max_corners=100", "--set", "guided=false" });
+  EXPECT_LE(few.at("matches").size(), 100U);
+  const json same = matchJson(reference_, current_, 0, { "--set", "max_corners=100", "guided=false" });
+  EXPECT_EQ(few.at("matches"), same.at("matches"));
+  EXPECT_EQ(run({ "points", "--set", "max_corners=100", "--json", reference_, current_ }).status, 0);
+}
+
+TEST_F(MatchImages, listsParameters)
+{
+  const Outcome outcome = run({ "--list-parameters" });
+  EXPECT_EQ(outcome.status, 0);
+  EXPECT_NE(outcome.out.find("max_corners (int, default 500): "), std::string::npos) << outcome.out;
+}
+
+TEST_F(MatchImages, refusesUnknownParametersAndValues)
+{
+  expectBadInput(match(reference_, current_, { "--set", "max_cornerz=100" }), "max_cornerz");
+  expectBadInput(match(reference_, current_, { "--set", "max_corners=many" }), "max_corners");
+  expectBadInput(match(reference_, current_, { "--set", "max_corners=0" }), "max_corners");
+  expectBadInput(match(reference_, current_, { "--set", "max_corners=0", "--set", "min_length=-1" }), "max_corners");
+  expectBadInput(match(reference_, current_, { "--set", "max_corners" }), "max_corners");
+}
+
+TEST_F(MatchImages, refusesUnknownOptions)
+{
+  expectBadInput(run({}), "points");
+  expectBadInput(run({ "circles", reference_, current_ }), "circles");
+  expectBadInput(run({ "points" }), "REF");
+  expectBadInput(run({ "points", reference_ }), "CUR");
+  expectBadInput(match(reference_, current_, { "--colour" }), "--colour");
+  expectBadInput(match(reference_, current_, { "--model", "affine" }), "--model");
+  expectBadInput(match(reference_, current_, { "--threads", "-1" }), "--threads");
+  expectBadInput(match(reference_, current_, { "--threads", "two" }), "--threads");
+  expectBadInput(match(reference_, current_, { "--overlay" }), "--overlay");
+}
+
+TEST_F(MatchImages, helps)
+{
+  EXPECT_EQ(run({ "--help" }).status, 0);
+  const Outcome outcome = run({ "points", "--help" });
+  EXPECT_EQ(outcome.status, 0);
+  EXPECT_EQ(outcome.err, "");
+  EXPECT_NE(outcome.out.find("--overlay"), std::string::npos);
+}
+
+TEST_F(MatchImages, refusesFilesThatAreNotImages)
+{
+  const std::string missing = path("missing.png");
+  expectBadInput(match(missing, current_), missing);
+  expectBadInput(match(reference_, missing), missing);
+  expectBadInput(match(path("."), current_), path("."));
+  const std::string text = writeText("text.png", "not an image\n");
+  expectBadInput(match(reference_, text), text);
+  const std::string empty = writeText("empty.png", "");
+  expectBadInput(match(reference_, empty), empty);
+}
+
+TEST_F(MatchImages, refusesFilesItMayNotRead)
+{
+  if (geteuid() == 0)
+  {
+    GTEST_SKIP() << "root may read everything";
+  }
+  std::filesystem::permissions(reference_, std::filesystem::perms::none);
+  expectBadInput(match(reference_, current_), reference_);
+}
+
+TEST_F(MatchImages, refusesDamagedImages)
+{
+  // The decoders of these write to standard error on their own.
+  for (const std::string ending : { ".png", ".jpg", ".pgm", ".bmp", ".tiff" })
+  {
+    const std::string file = write("damaged" + ending, texture(1));
+    std::filesystem::resize_file(file, std::filesystem::file_size(file) / 2);
+    expectBadInput(match(reference_, file), file);
+  }
+}
+
+TEST_F(MatchImages, refusesTinyImages)
+{
+  const std::string tiny = write("tiny.png", cv::Mat(1, 1, CV_8UC1, cv::Scalar(7)));
+  expectBadInput(match(reference_, tiny), tiny);
+  expectBadInput(match(tiny, reference_), tiny);
+}
+
+TEST_F(MatchImages, refusesHugeImages)
+{
+  const std::string huge = writeText("huge.pgm", "P5 8000 8000 255\n");
+  expectBadInput(match(huge, current_), huge);
+  const std::string header = write("huge.png", cv::Mat(7200, 7200, CV_8UC1, cv::Scalar(0)));
+  expectBadInput(match(reference_, header), header);
+}
+
+TEST_F(MatchImages, findsNothingInConstantImages)
+{
+  const std::string constant = write("constant.png", cv::Mat(360, 480, CV_8UC1, cv::Scalar(90)));
+  for (const json& result : { matchJson(constant, current_, 1), matchJson(reference_, constant, 1),
+                              matchJson(constant, constant, 1) })
+  {
+    EXPECT_EQ(result.at("success"), false);
+    EXPECT_TRUE(result.at("matrix").is_null());
+    EXPECT_EQ(result.at("inliers"), 0);
+    EXPECT_TRUE(result.at("rms_error").is_null());
+    EXPECT_FALSE(result.at("message").get<std::string>().empty());
+  }
+}
+
+TEST_F(MatchImages, findsNothingInUnrelatedImages)
+{
+  for (const std::string model : { "homography", "fundamental" })
+  {
+    const json result = matchJson(reference_, write("other.png", texture(2)), 1, { "--model", model });
+    EXPECT_EQ(result.at("success"), false);
+    EXPECT_TRUE(result.at("matrix").is_null());
+    for (const json& pair : result.at("matches"))
+    {
+      EXPECT_FALSE(pair.at("inlier").get<bool>());
+    }
+  }
+  EXPECT_EQ(match(reference_, path("other.png"), { "--overlay", path("overlay.png") }).status, 1);
+  EXPECT_FALSE(cv::imread(path("overlay.png")).empty()) << "a picture says why";
+}
+
+TEST_F(MatchImages, findsNothingInAMirror)
+{
+  cv::Mat mirrored;
+  cv::flip(texture(1), mirrored, 1);
+  const std::string mirror = write("mirror.png", mirrored);
+  EXPECT_EQ(match(reference_, mirror).status, 1);
+  EXPECT_EQ(match(reference_, mirror, { "--model", "fundamental" }).status, 1);
+}
+
+TEST_F(MatchImages, acceptsColourDepthAndTransparency)
+{
+  const cv::Mat grey = texture(1);
+  cv::Mat colour;
+  cv::cvtColor(grey, colour, cv::COLOR_GRAY2BGR);
+  cv::Mat transparent;
+  cv::cvtColor(grey, transparent, cv::COLOR_GRAY2BGRA);
+  cv::Mat deep;
+  grey.convertTo(deep, CV_16U, 257.0);
+  const json expected = matchJson(reference_, current_, 0);
+  for (const std::string& file :
+       { write("colour.png", colour), write("transparent.png", transparent), write("deep.png", deep) })
+  {
+    const json result = matchJson(file, current_, 0);
+    EXPECT_EQ(result.at("matrix"), expected.at("matrix")) << file;
+  }
+}
+
+TEST_F(MatchImages, acceptsImagesOfTwoSizes)
+{
+  const json result = matchJson(reference_, write("wide.png", warped(texture(1), { 640, 300 })), 0);
+  EXPECT_LT(cornerError(result), 1.5);
+}

@@ -1,0 +1,262 @@
+// Copyright (c) 2026, the view_servo authors
+// SPDX-License-Identifier: BSD-3-Clause
+#include "view_servo/views/image_io.h"
+
+#include "support/temporary_directory.h"
+
+#include <gtest/gtest.h>
+#include <opencv2/core.hpp>
+#include <opencv2/imgcodecs.hpp>
+#include <opencv2/imgproc.hpp>
+
+#include <unistd.h>
+
+#include <array>
+#include <filesystem>
+#include <fstream>
+#include <iterator>
+#include <vector>
+
+using view_servo::ImageError;
+using view_servo::readGreyImage;
+using view_servo::toGrey;
+using view_servo::test::TemporaryDirectory;
+
+namespace
+{
+cv::Mat randomImage(int type, const cv::Size& size = cv::Size(40, 30))
+{
+  cv::Mat image(size, type);
+  cv::RNG rng(7);
+  rng.fill(image, cv::RNG::UNIFORM, 0, image.depth() == CV_16U ? 65536 : 256);
+  return image;
+}
+
+/** Largest difference of grey levels. */
+double difference(const cv::Mat& a, const cv::Mat& b)
+{
+  return cv::norm(a, b, cv::NORM_INF);
+}
+
+std::string errorOf(const std::string& path)
+{
+  try
+  {
+    readGreyImage(path);
+  }
+  catch (const ImageError& error)
+  {
+    return error.what();
+  }
+  return "no error";
+}
+
+class ImageIo : public ::testing::Test
+{
+protected:
+  std::string path(const std::string& name) const
+  {
+    return directory_.path() / name;
+  }
+
+  std::string writeImage(const std::string& name, const cv::Mat& image) const
+  {
+    EXPECT_TRUE(cv::imwrite(path(name), image));
+    return path(name);
+  }
+
+  std::string writeBytes(const std::string& name, const std::string& bytes) const
+  {
+    std::ofstream(path(name), std::ios::binary) << bytes;
+    return path(name);
+  }
+
+  /** The first `fraction` of a file. */
+  std::string cutShort(const std::string& whole, const std::string& name, double fraction) const
+  {
+    std::ifstream file(whole, std::ios::binary);
+    const std::string bytes(std::istreambuf_iterator<char>(file), {});
+    return writeBytes(name, bytes.substr(0, static_cast<std::size_t>(fraction * static_cast<double>(bytes.size()))));
+  }
+
+  /** One line that names the file and has `reason` in it. */
+  static void expectRefused(const std::string& file, const std::string& reason)
+  {
+    const std::string error = errorOf(file);
+    EXPECT_NE(error.find(file), std::string::npos) << error;
+    EXPECT_NE(error.find(reason), std::string::npos) << error;
+    EXPECT_EQ(error.find('\n'), std::string::npos) << error;
+  }
+
+private:
+  TemporaryDirectory directory_;
+};
+
+}  // namespace
+
+TEST(ToGrey, sharesGreyImages)
+{
+  const cv::Mat image = randomImage(CV_8UC1);
+  EXPECT_EQ(toGrey(image, "image").data, image.data);
+}
+
+TEST(ToGrey, weighsColours)
+{
+  const cv::Mat blue(20, 20, CV_8UC3, cv::Scalar(255, 0, 0));
+  const cv::Mat green(20, 20, CV_8UC3, cv::Scalar(0, 255, 0));
+  EXPECT_EQ(toGrey(blue, "image").type(), CV_8UC1);
+  EXPECT_EQ(toGrey(blue, "image").at<uchar>(3, 3), 29);
+  EXPECT_EQ(toGrey(green, "image").at<uchar>(3, 3), 150);
+}
+
+TEST(ToGrey, ignoresTransparency)
+{
+  const cv::Mat image = randomImage(CV_8UC4);
+  cv::Mat opaque;
+  cv::cvtColor(image, opaque, cv::COLOR_BGRA2BGR);
+  EXPECT_EQ(difference(toGrey(image, "image"), toGrey(opaque, "image")), 0.0);
+}
+
+TEST(ToGrey, mapsTheWhole16BitRange)
+{
+  cv::Mat image(16, 16, CV_16UC1, cv::Scalar(65535));
+  image.at<ushort>(0, 0) = 0;
+  image.at<ushort>(0, 1) = 128 * 257;
+  const cv::Mat grey = toGrey(image, "image");
+  EXPECT_EQ(grey.type(), CV_8UC1);
+  EXPECT_EQ(grey.at<uchar>(0, 0), 0);
+  EXPECT_EQ(grey.at<uchar>(0, 1), 128);
+  EXPECT_EQ(grey.at<uchar>(5, 5), 255);
+}
+
+TEST(ToGrey, refusesOtherTypes)
+{
+  EXPECT_THROW(toGrey(cv::Mat(), "image"), ImageError);
+  EXPECT_THROW(toGrey(cv::Mat(20, 20, CV_32FC1, cv::Scalar(0.5)), "image"), ImageError);
+  EXPECT_THROW(toGrey(cv::Mat(20, 20, CV_8SC1, cv::Scalar(1)), "image"), ImageError);
+  EXPECT_THROW(toGrey(cv::Mat(20, 20, CV_8UC2, cv::Scalar(1, 1)), "image"), ImageError);
+}
+
+TEST(ToGrey, refusesSizesBeyondTheLimits)
+{
+  EXPECT_NO_THROW(toGrey(randomImage(CV_8UC1, { 16, 16 }), "image"));
+  EXPECT_THROW(toGrey(randomImage(CV_8UC1, { 15, 200 }), "image"), ImageError);
+  EXPECT_THROW(toGrey(randomImage(CV_8UC1, { 200, 15 }), "image"), ImageError);
+  EXPECT_NO_THROW(toGrey(cv::Mat(5000, 10000, CV_8UC1), "image"));
+  EXPECT_THROW(toGrey(cv::Mat(5001, 10000, CV_8UC1), "image"), ImageError);
+}
+
+TEST_F(ImageIo, readsGreyLosslessly)
+{
+  const cv::Mat image = randomImage(CV_8UC1);
+  EXPECT_EQ(difference(readGreyImage(writeImage("grey.png", image)), image), 0.0);
+  EXPECT_EQ(difference(readGreyImage(writeImage("grey.pgm", image)), image), 0.0);
+  EXPECT_EQ(difference(readGreyImage(writeImage("grey.bmp", image)), image), 0.0);
+  EXPECT_EQ(difference(readGreyImage(writeImage("grey.tiff", image)), image), 0.0);
+}
+
+TEST_F(ImageIo, readsPnmWithComments)
+{
+  const std::string pixels(20 * 16, 'x');
+  const cv::Mat image = readGreyImage(writeBytes("a.pgm", "P5\n# made by hand\n20 # wide\n16\n255\n" + pixels));
+  EXPECT_EQ(image.size(), cv::Size(20, 16));
+  EXPECT_EQ(image.at<uchar>(0, 0), 'x');
+}
+
+TEST_F(ImageIo, convertsWhatItReads)
+{
+  for (const int type : { CV_8UC3, CV_8UC4, CV_16UC1, CV_16UC3, CV_16UC4 })
+  {
+    const cv::Mat image = randomImage(type);
+    const cv::Mat grey = readGreyImage(writeImage("image.png", image));
+    EXPECT_EQ(grey.type(), CV_8UC1) << cv::typeToString(type);
+    EXPECT_EQ(difference(grey, toGrey(image, "image")), 0.0) << cv::typeToString(type);
+  }
+}
+
+TEST_F(ImageIo, readsGreyWithAlpha)
+{
+  // OpenCV writes no such files, so here is one: 16 x 16 pixels of grey 100 and alpha 255.
+  static constexpr std::array<unsigned char, 75> png{
+    0x89, 0x50, 0x4e, 0x47, 0x0d, 0x0a, 0x1a, 0x0a, 0x00, 0x00, 0x00, 0x0d, 0x49, 0x48, 0x44, 0x52, 0x00, 0x00, 0x00,
+    0x10, 0x00, 0x00, 0x00, 0x10, 0x08, 0x04, 0x00, 0x00, 0x00, 0xb5, 0xfa, 0x37, 0xea, 0x00, 0x00, 0x00, 0x12, 0x49,
+    0x44, 0x41, 0x54, 0x78, 0xda, 0x63, 0x48, 0xf9, 0x8f, 0x1f, 0x32, 0x8c, 0x2a, 0x18, 0x49, 0x0a, 0x00, 0xe1, 0xf3,
+    0x63, 0x10, 0x34, 0x90, 0x4c, 0x6f, 0x00, 0x00, 0x00, 0x00, 0x49, 0x45, 0x4e, 0x44, 0xae, 0x42, 0x60, 0x82
+  };
+  const cv::Mat grey = readGreyImage(writeBytes("grey_alpha.png", std::string(png.begin(), png.end())));
+  EXPECT_EQ(difference(grey, cv::Mat(16, 16, CV_8UC1, cv::Scalar(100))), 0.0);
+}
+
+TEST_F(ImageIo, readsJpeg)
+{
+  cv::Mat image;
+  cv::GaussianBlur(randomImage(CV_8UC3, { 200, 100 }), image, cv::Size(), 4.0);
+  EXPECT_LT(difference(readGreyImage(writeImage("image.jpg", image)), toGrey(image, "image")), 8.0);
+  EXPECT_TRUE(cv::imwrite(path("progressive.jpg"), image, { cv::IMWRITE_JPEG_PROGRESSIVE, 1 }));
+  EXPECT_LT(difference(readGreyImage(path("progressive.jpg")), toGrey(image, "image")), 8.0);
+}
+
+TEST_F(ImageIo, refusesWhatIsNotAFile)
+{
+  expectRefused(path("nothing.png"), "No such file");
+  expectRefused(path("."), "not a file");
+  expectRefused("/dev/zero", "not a file");
+}
+
+TEST_F(ImageIo, refusesFilesItMayNotRead)
+{
+  if (geteuid() == 0)
+  {
+    GTEST_SKIP() << "root may read everything";
+  }
+  const std::string file = writeImage("secret.png", randomImage(CV_8UC1));
+  std::filesystem::permissions(file, std::filesystem::perms::none);
+  expectRefused(file, "ermission denied");
+}
+
+TEST_F(ImageIo, refusesWhatIsNotAnImage)
+{
+  expectRefused(writeBytes("empty.png", ""), "not an image");
+  expectRefused(writeBytes("text.png", "a b c\n"), "not an image");
+  expectRefused(writeBytes("text.pgm", "P5 wide high"), "not an image");
+  expectRefused(writeBytes("signature.png", "\x89PNG\r\n\x1a\n"), "not an image");
+  expectRefused(writeBytes("signature.jpg", "\xFF\xD8\xFF"), "not an image");
+}
+
+TEST_F(ImageIo, refusesImagesCutShort)
+{
+  for (const std::string extension : { ".png", ".jpg", ".pgm" })
+  {
+    const std::string whole = writeImage("whole" + extension, randomImage(CV_8UC1, { 200, 100 }));
+    expectRefused(cutShort(whole, "cut" + extension, 0.9), "not an image");
+    expectRefused(cutShort(whole, "cut" + extension, 0.5), "not an image");
+  }
+}
+
+TEST_F(ImageIo, refusesFloatImages)
+{
+  expectRefused(writeImage("float.tiff", cv::Mat(20, 20, CV_32FC1, cv::Scalar(0.5))), "neither 8 nor 16 bits");
+}
+
+TEST_F(ImageIo, refusesTinyImages)
+{
+  expectRefused(writeImage("tiny.png", randomImage(CV_8UC1, { 1, 1 })), "1 x 1");
+  expectRefused(writeImage("narrow.bmp", randomImage(CV_8UC1, { 200, 2 })), "200 x 2");
+}
+
+TEST_F(ImageIo, refusesHugeImagesByTheirHeaderAlone)
+{
+  // Only headers: had anything been decoded, these would be called damaged.
+  using namespace std::string_literals;
+  const std::string png = "\x89PNG\r\n\x1a\n\0\0\0\rIHDR\0\0\x27\x10\0\0\x27\x10\x08\0\0\0\0"s;
+  expectRefused(writeBytes("huge.png", png), "10000 x 10000");
+  const std::string jpeg = "\xFF\xD8\xFF\xE0\0\x04xx\xFF\xFF\xC2\0\x0B\x08\x27\x10\x27\x10"s;
+  expectRefused(writeBytes("huge.jpg", jpeg), "10000 x 10000");
+  expectRefused(writeBytes("huge.ppm", "P6\n10000 10000\n255\n"), "over 50 megapixels");
+  expectRefused(writeBytes("overflow.pgm", "P5\n4294967297 4294967297\n255\n"), "over 50 megapixels");
+}
+
+TEST_F(ImageIo, refusesHugeImagesOfOtherFormats)
+{
+  expectRefused(writeImage("huge.bmp", cv::Mat(5001, 10000, CV_8UC1, cv::Scalar(0))), "over 50 megapixels");
+}

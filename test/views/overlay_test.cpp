@@ -1,0 +1,174 @@
+// Copyright (c) 2026, the view_servo authors
+// SPDX-License-Identifier: BSD-3-Clause
+#include "view_servo/views/overlay.h"
+
+#include <gtest/gtest.h>
+#include <opencv2/core.hpp>
+
+#include <cmath>
+#include <limits>
+
+using view_servo::drawOverlay;
+using view_servo::GeometryModel;
+using view_servo::MatchOutcome;
+using view_servo::PreparedImage;
+using view_servo::ViewMatch;
+
+namespace
+{
+/** Grey, so that all colour in a picture was drawn. */
+PreparedImage image(int width, int height, const cv::Rect& region = cv::Rect())
+{
+  return PreparedImage(cv::Mat(height, width, CV_8UC1, cv::Scalar(100)), region, {});
+}
+
+/** Widths of 450 + 450 pixels are not scaled; the current image starts here. */
+constexpr int CURRENT_LEFT = 454;
+
+ViewMatch noMatch()
+{
+  ViewMatch match;
+  match.matrix.setConstant(std::numeric_limits<double>::quiet_NaN());
+  match.message = "nothing";
+  return match;
+}
+
+ViewMatch matchOf(const Eigen::Matrix3d& h)
+{
+  ViewMatch match;
+  match.outcome = MatchOutcome::MATCHED;
+  match.message = "something";
+  match.matrix = h;
+  return match;
+}
+
+Eigen::Matrix3d shift(double u, double v)
+{
+  Eigen::Matrix3d h = Eigen::Matrix3d::Identity();
+  h(0, 2) = u;
+  h(1, 2) = v;
+  return h;
+}
+
+/** Pixels of an area that are not grey. */
+int colouredPixels(const cv::Mat& picture, const cv::Rect& area)
+{
+  int count = 0;
+  for (int y = area.y; y < area.y + area.height; ++y)
+  {
+    for (int x = area.x; x < area.x + area.width; ++x)
+    {
+      const cv::Vec3b pixel = picture.at<cv::Vec3b>(y, x);
+      count += pixel[0] != pixel[1] || pixel[1] != pixel[2] ? 1 : 0;
+    }
+  }
+  return count;
+}
+
+cv::Rect around(double x, double y, int radius = 2)
+{
+  return { cvRound(x) - radius, cvRound(y) - radius, 2 * radius + 1, 2 * radius + 1 };
+}
+
+}  // namespace
+
+TEST(Overlay, showsBothImagesWithoutScalingWhenTheyFit)
+{
+  const cv::Mat picture = drawOverlay(image(450, 300), image(450, 200), noMatch());
+  EXPECT_EQ(picture.type(), CV_8UC3);
+  EXPECT_EQ(picture.cols, CURRENT_LEFT + 450);
+  EXPECT_GT(picture.rows, 300);
+  EXPECT_EQ(picture.at<cv::Vec3b>(299, 449), cv::Vec3b(100, 100, 100));
+  EXPECT_EQ(picture.at<cv::Vec3b>(199, CURRENT_LEFT), cv::Vec3b(100, 100, 100));
+  EXPECT_NE(picture.at<cv::Vec3b>(201, CURRENT_LEFT), cv::Vec3b(100, 100, 100));
+}
+
+TEST(Overlay, keepsAReadableWidth)
+{
+  for (const int width : { 16, 100, 1000, 4000 })
+  {
+    const cv::Mat picture = drawOverlay(image(width, 60), image(64, width), noMatch());
+    EXPECT_GE(picture.cols, 800);
+    EXPECT_LE(picture.cols, 1610);
+  }
+}
+
+TEST(Overlay, joinsInliersOnly)
+{
+  ViewMatch match = noMatch();
+  match.matches.push_back({ { { 100.0, 50.0 }, { 300.0, 50.0 } }, 1.0, true });
+  match.matches.push_back({ { { 100.0, 150.0 }, { 300.0, 150.0 } }, 1.0, false });
+  const cv::Mat picture = drawOverlay(image(450, 200), image(450, 200), match);
+
+  EXPECT_GT(colouredPixels(picture, around(100, 50)), 5);
+  EXPECT_GT(colouredPixels(picture, around(CURRENT_LEFT + 300, 50)), 5);
+  EXPECT_GT(colouredPixels(picture, around(250, 50)), 2) << "the line between them";
+
+  EXPECT_NE(picture.at<cv::Vec3b>(150, 100), cv::Vec3b(100, 100, 100)) << "a candidate's dot";
+  EXPECT_NE(picture.at<cv::Vec3b>(150, CURRENT_LEFT + 300), cv::Vec3b(100, 100, 100));
+  EXPECT_EQ(picture.at<cv::Vec3b>(150, 250), cv::Vec3b(100, 100, 100));
+}
+
+TEST(Overlay, coloursTellPlacesApart)
+{
+  ViewMatch match = noMatch();
+  match.matches.push_back({ { { 20.0, 50.0 }, { 20.0, 50.0 } }, 1.0, true });
+  match.matches.push_back({ { { 430.0, 100.0 }, { 430.0, 100.0 } }, 1.0, true });
+  const cv::Mat picture = drawOverlay(image(450, 200), image(450, 200), match);
+  EXPECT_GT(cv::norm(picture.at<cv::Vec3b>(50, 20), picture.at<cv::Vec3b>(100, 430)), 100.0);
+}
+
+TEST(Overlay, drawsTheReferencesOutlineInBothImages)
+{
+  const cv::Rect region(50, 40, 100, 80);
+  const cv::Mat picture = drawOverlay(image(450, 200, region), image(450, 200), matchOf(shift(30.0, 20.0)));
+  EXPECT_GT(colouredPixels(picture, around(100, 39.5)), 5);
+  EXPECT_GT(colouredPixels(picture, around(149.5, 80)), 5);
+  EXPECT_GT(colouredPixels(picture, around(CURRENT_LEFT + 130, 59.5)), 5);
+  EXPECT_GT(colouredPixels(picture, around(CURRENT_LEFT + 79.5, 100)), 5);
+  EXPECT_EQ(colouredPixels(picture, around(100, 80, 20)), 0);
+}
+
+TEST(Overlay, drawsNoOutlineForFundamentalMatrices)
+{
+  ViewMatch match = matchOf(Eigen::Matrix3d::Identity());
+  match.model = GeometryModel::FUNDAMENTAL;
+  const cv::Mat picture = drawOverlay(image(450, 200), image(450, 200), match);
+  EXPECT_EQ(colouredPixels(picture, { 0, 0, picture.cols, 200 }), 0);
+}
+
+TEST(Overlay, clipsTheOutlineToTheCurrentImage)
+{
+  const cv::Mat picture = drawOverlay(image(450, 200), image(450, 150), matchOf(shift(-100.0, 20.0)));
+  // Nothing of the current image's outline may reach into the reference or below its own image.
+  EXPECT_EQ(colouredPixels(picture, { 20, 20, 400, 160 }), 0);
+  EXPECT_EQ(colouredPixels(picture, { CURRENT_LEFT, 150, 450, picture.rows - 150 }), 0);
+}
+
+TEST(Overlay, drawsWhatIsInFrontWhenThePlaneReachesTheHorizon)
+{
+  Eigen::Matrix3d h = Eigen::Matrix3d::Identity();
+  h(2, 0) = -1.0 / 300.0;  // columns from 300 on are behind the camera
+  ViewMatch match = matchOf(h);
+  match.matches.push_back({ { { 50.0, 50.0 }, { 60.0, 60.0 } }, 1.0, true });
+  const cv::Mat picture = drawOverlay(image(450, 200), image(450, 200), match);
+  EXPECT_GT(colouredPixels(picture, around(CURRENT_LEFT + 1, 100)), 3) << "the left side is in front";
+  const cv::Mat same = drawOverlay(image(450, 200), image(450, 200), [&] {
+    match.matrix = -h;
+    return match;
+  }());
+  EXPECT_EQ(cv::norm(picture, same, cv::NORM_INF), 0.0) << "a homography has no sign";
+}
+
+TEST(Overlay, saysWhatHappened)
+{
+  const auto caption = [](const cv::Mat& picture) { return picture.rowRange(200, picture.rows).clone(); };
+  ViewMatch match = noMatch();
+  const cv::Mat first = caption(drawOverlay(image(450, 200), image(450, 200), match));
+  match.message = "something else that is very, very long: " + std::string(300, 'x');
+  const cv::Mat second = caption(drawOverlay(image(450, 200), image(450, 200), match));
+  EXPECT_GT(cv::norm(first, second, cv::NORM_INF), 50.0);
+  EXPECT_EQ(cv::norm(second.colRange(second.cols - 4, second.cols), cv::NORM_INF),
+            cv::norm(second.colRange(0, 4), cv::NORM_INF))
+      << "it fits";
+}
