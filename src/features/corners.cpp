@@ -181,7 +181,7 @@ std::vector<Corner> detectCorners(const cv::Mat& image, const CornerParams& para
   const std::vector<Peak> peaks = localMaxima(response, mask, params.border);
 
   // Strongest first, each taken unless one already taken is too close; a grid keeps the search local.
-  const double cell = std::max(1.0, params.min_distance);
+  const double cell = params.min_distance + 2.0;  // refinement moves each of two peaks by a pixel at most
   const int grid_cols = static_cast<int>(image.cols / cell) + 1;
   const int grid_rows = static_cast<int>(image.rows / cell) + 1;
   std::vector<std::vector<int>> grid(static_cast<std::size_t>(grid_cols) * static_cast<std::size_t>(grid_rows));

@@ -61,7 +61,10 @@ std::vector<double> realRoots(double a, double b, double c)
     const double s = -std::copysign(std::cbrt(std::abs(r) + std::sqrt(std::max(r * r - q * q * q, 0.0))), r);
     roots.push_back(s + (s != 0.0 ? q / s : 0.0) - a / 3.0);
   }
-  const auto value = [=](double x) { return ((x + a) * x + b) * x + c; };
+  const auto value = [=](double x)
+  {
+    return ((x + a) * x + b) * x + c;
+  };
   for (double& x : roots)
   {
     for (int i = 0; i < 3; ++i)
@@ -151,8 +154,7 @@ double sampsonError(const Eigen::Matrix3d& f, const Correspondence& pair)
   const double back_u = f(0, 0) * u_cur + f(1, 0) * v_cur + f(2, 0);
   const double back_v = f(0, 1) * u_cur + f(1, 1) * v_cur + f(2, 1);
   const double algebraic = u_cur * line_u + v_cur * line_v + line_w;
-  const double error =
-      algebraic * algebraic / (line_u * line_u + line_v * line_v + back_u * back_u + back_v * back_v);
+  const double error = algebraic * algebraic / (line_u * line_u + line_v * line_v + back_u * back_u + back_v * back_v);
   return std::isnan(error) ? std::numeric_limits<double>::infinity() : error;  // where both points are epipoles
 }
 

@@ -63,7 +63,10 @@ inline TransferResidual backwardResidual(const Eigen::Matrix3d& h_inverse, const
   return { y.hnormalized() - pair.reference, -projectionDerivative(y) * h_inverse, y };
 }
 
-/** Signed Sampson distance (thesis eq. 9.2 before squaring), and its 1x9 Jacobian by F; NaN where both points are epipoles. */
+/**
+ * Signed Sampson distance (thesis eq. 9.2 before squaring), and its 1x9 Jacobian by F. NaN where both points are
+ * epipoles.
+ */
 inline double sampsonResidual(const Eigen::Matrix3d& f, const Correspondence& pair,
                               Eigen::Matrix<double, 1, 9>& jacobian)
 {
@@ -131,7 +134,10 @@ struct Orthonormal
   {
     const Eigen::DiagonalMatrix<double, 3> s(std::cos(p), std::sin(p), 0.0);
     Matrix9x7d d;
-    const auto set = [&d](int column, const Eigen::Matrix3d& m) { d.col(column) = rowMajor(m); };
+    const auto set = [&d](int column, const Eigen::Matrix3d& m)
+    {
+      d.col(column) = rowMajor(m);
+    };
     for (int k = 0; k < 3; ++k)
     {
       const Eigen::Vector3d e = Eigen::Vector3d::Unit(k);

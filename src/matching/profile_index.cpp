@@ -144,7 +144,8 @@ struct ProfileIndex::Tree
     float distances[1000];
     nanoflann::KNNResultSet<float, std::uint32_t> result(wanted);
     result.init(indices, distances);
-    tree.findNeighbors(result, query, searchParams(static_cast<float>(params.epsilon)));
+    // nanoflann compares squared distances, so its tolerance is (1 + epsilon)² - 1.
+    tree.findNeighbors(result, query, searchParams(static_cast<float>(params.epsilon * (params.epsilon + 2.0))));
     for (std::size_t i = 0; i < result.size(); ++i)
     {
       found.emplace_back(indices[i], distances[i]);

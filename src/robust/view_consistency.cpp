@@ -99,8 +99,10 @@ double viewConstraint(const std::array<Correspondence, 5>& five)
   {
     const Eigen::Vector3d ak = a.col(2 + k);
     const Eigen::Vector3d bk = b.col(2 + k);
-    rows[k] = { det(b2, a3, ak) + det(a2, b3, ak) + det(a2, a3, bk), det(b2, b3, ak) + det(b2, a3, bk) + det(a2, b3, bk) };
-    const double size = std::max(a2.norm(), b2.norm()) * std::max(a3.norm(), b3.norm()) * std::max(ak.norm(), bk.norm());
+    rows[k] = { det(b2, a3, ak) + det(a2, b3, ak) + det(a2, a3, bk),
+                det(b2, b3, ak) + det(b2, a3, bk) + det(a2, b3, bk) };
+    const double size =
+        std::max(a2.norm(), b2.norm()) * std::max(a3.norm(), b3.norm()) * std::max(ak.norm(), bk.norm());
     const double length = rows[k].norm();
     if (!(length > VANISHING * size))
     {

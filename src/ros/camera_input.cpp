@@ -42,24 +42,28 @@ CameraInputParams CameraInputParams::read(ParameterReader& reader)
 }
 
 CameraInput::CameraInput(const ros::NodeHandle& nh, const CameraInputParams& params, Callback on_frame)
-  : params_(params)
-  , on_frame_(std::move(on_frame))
-  , last_diagnosis_(ros::WallTime::now())
-  , transport_(nh)
-  , synchronizer_(static_cast<std::uint32_t>(params.queue_size))
+  : params_(params),
+    on_frame_(std::move(on_frame)),
+    last_diagnosis_(ros::WallTime::now()),
+    transport_(nh),
+    synchronizer_(static_cast<std::uint32_t>(params.queue_size))
 {
   const auto queue_size = static_cast<std::uint32_t>(params.queue_size);
   ros::NodeHandle topics_nh(nh);
   synchronizer_.connectInput(image_subscriber_, info_subscriber_);
   synchronizer_.registerCallback(&CameraInput::frameCallback, this);
-  image_subscriber_.registerCallback([this](const sensor_msgs::ImageConstPtr&) {
-    const std::lock_guard<std::mutex> lock(mutex_);
-    ++images_;
-  });
-  info_subscriber_.registerCallback([this](const sensor_msgs::CameraInfoConstPtr&) {
-    const std::lock_guard<std::mutex> lock(mutex_);
-    ++infos_;
-  });
+  image_subscriber_.registerCallback(
+      [this](const sensor_msgs::ImageConstPtr&)
+      {
+        const std::lock_guard<std::mutex> lock(mutex_);
+        ++images_;
+      });
+  info_subscriber_.registerCallback(
+      [this](const sensor_msgs::CameraInfoConstPtr&)
+      {
+        const std::lock_guard<std::mutex> lock(mutex_);
+        ++infos_;
+      });
   image_subscriber_.subscribe(transport_, "image_raw", queue_size, image_transport::TransportHints());
   info_subscriber_.subscribe(topics_nh, "camera_info", queue_size);
   check_timer_ =

@@ -17,8 +17,8 @@ std::filesystem::path defaultViewsDir()
 {
   const char* ros_home = std::getenv("ROS_HOME");
   const char* home = std::getenv("HOME");
-  const std::filesystem::path root =
-      ros_home != nullptr ? std::filesystem::path(ros_home) : std::filesystem::path(home != nullptr ? home : ".") / ".ros";
+  const std::filesystem::path root = ros_home != nullptr ? std::filesystem::path(ros_home)
+                                                         : std::filesystem::path(home != nullptr ? home : ".") / ".ros";
   return root / "view_servo" / "views";
 }
 

@@ -10,8 +10,8 @@ NodeBase::NodeBase(const ros::NodeHandle& nh, const ros::NodeHandle& private_nh)
   : nh_(nh), private_nh_(private_nh), diagnostics_(nh, private_nh)
 {
   diagnostics_.setHardwareID("none");
-  diagnostics_timer_ = nh_.createWallTimer(ros::WallDuration(1.0),
-                                           [this](const ros::WallTimerEvent&) { diagnostics_.force_update(); });
+  diagnostics_timer_ =
+      nh_.createWallTimer(ros::WallDuration(1.0), [this](const ros::WallTimerEvent&) { diagnostics_.force_update(); });
 }
 
 std::string oneLine(const std::exception& error)

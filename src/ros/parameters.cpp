@@ -149,8 +149,8 @@ void ParameterReader::warnOfUnknown() const
       continue;
     }
     const std::string name = key.substr(prefix.size());
-    const bool known = std::any_of(known_.begin(), known_.end(),
-                                   [&](const Parameter& parameter) { return parameter.name == name; });
+    const bool known =
+        std::any_of(known_.begin(), known_.end(), [&](const Parameter& parameter) { return parameter.name == name; });
     // Deeper names belong to plugins, such as image transports.
     if (!known && name.find('/') == std::string::npos)
     {

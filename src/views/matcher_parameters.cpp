@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdint>
 #include <locale>
 #include <sstream>
 #include <stdexcept>
@@ -60,6 +61,15 @@ Parameter real(std::string name, double& value, std::string description)
     }
     value = parsed;
     return true;
+  };
+  return parameter;
+}
+
+Parameter natural(std::string name, std::uint64_t& value, std::string description)
+{
+  Parameter parameter = number(std::move(name), "int", value, std::move(description));
+  parameter.set = [&value](const std::string& text) {
+    return text.find('-') == std::string::npos && parse(text, value);  // streams read -1 as the largest number
   };
   return parameter;
 }
@@ -193,7 +203,7 @@ std::vector<Parameter> matcherParameters(ViewMatcherParams& params)
     real("patch_correlation", params.guidance.min_correlation, "least correlation of the patches, [-1, 1)"),
     boolean("scale_search", params.scale_search, "try other scales when the first finds no geometry"),
     real("min_significance", params.min_log_significance, "-log10 of the false alarms a geometry may have, >= 0"),
-    number("seed", "int", params.seed, "of all random draws"),
+    natural("seed", params.seed, "of all random draws, >= 0"),
   };
 }
 

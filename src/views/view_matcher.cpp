@@ -33,7 +33,8 @@ struct LevelPair
   int reference;
   int current;
 };
-constexpr LevelPair ATTEMPTS[] = { { 0, 0 }, { 2, 2 }, { 2, 0 }, { 0, 2 }, { 3, 0 }, { 0, 3 }, { 4, 4 } };
+constexpr LevelPair ATTEMPTS[] = { { 0, 0 }, { 2, 2 }, { 2, 0 }, { 0, 2 }, { 4, 4 },
+                                   { 3, 0 }, { 0, 3 }, { 4, 0 }, { 0, 4 } };
 
 /** Adds the time since the last call, or since construction, to a stage. */
 class StageClock
@@ -313,10 +314,6 @@ public:
           agreeing.push_back(match);
         }
       }
-      if (agreeing.size() < inliers_.size() / 2)
-      {
-        return;  // patches cannot be compared here (blur, reflections): what the profiles found stands
-      }
       matrix_ = refined;
       inliers_ = std::move(agreeing);
     }
@@ -378,20 +375,30 @@ private:
 
   std::vector<Match> alongHomography() const
   {
-    std::vector<double> scores(from_.corners.size(), 0.0);
+    // Candidates that agree, ...
+    std::vector<std::optional<Match>> of_row(from_.corners.size());
     for (const Match& candidate : candidates_)
     {
       if (geometry_.agrees(matrix_, correspondence(candidate)))
       {
-        scores[static_cast<std::size_t>(candidate.row)] = candidate.score;
+        of_row[static_cast<std::size_t>(candidate.row)] = candidate;
       }
     }
-    std::vector<Match> matches;
+    // ... with the more exact position of their patch where there is one, and what only the patches find.
     for (const GuidedMatch& match :
          searchAlongHomography(reference_.image(levels_.reference), from_.corners, current_.image(levels_.current),
                                matrix_, geometry_.threshold(), params_.guidance))
     {
-      matches.push_back({ match.reference, match.current, scores[static_cast<std::size_t>(match.reference)] });
+      std::optional<Match>& known = of_row[static_cast<std::size_t>(match.reference)];
+      known = Match{ match.reference, match.current, known ? known->score : 0.0 };
+    }
+    std::vector<Match> matches;
+    for (const std::optional<Match>& match : of_row)
+    {
+      if (match)
+      {
+        matches.push_back(*match);
+      }
     }
     return matches;
   }

@@ -5,9 +5,10 @@
 #include "../../src/geometry/residuals.h"
 #include "../support/synthetic_scene.h"
 
-#include <Eigen/LU>
 #include <gtest/gtest.h>
 #include <rapidcheck/gtest.h>
+#include <Eigen/LU>
+#include <Eigen/SVD>
 
 #include <algorithm>
 #include <cmath>
@@ -223,8 +224,7 @@ RC_GTEST_PROP(SampsonResidual, JacobianMatchesNumericOne, (std::uint64_t seed))
   const test::Scene scene = makeScene(1, 5.0, seed);
   const Normalization unit{ { 320.0, 240.0 }, 0.005 };
   const Correspondence pair = { unit(scene.pairs[0].reference), unit(scene.pairs[0].current) };
-  const Eigen::Matrix3d f =
-      (unit.inverseMatrix().transpose() * scene.fundamental * unit.inverseMatrix()).normalized();
+  const Eigen::Matrix3d f = (unit.inverseMatrix().transpose() * scene.fundamental * unit.inverseMatrix()).normalized();
   Eigen::Matrix<double, 1, 9> jacobian;
   Eigen::Matrix<double, 1, 9> unused;
   sampsonResidual(f, pair, jacobian);
@@ -234,8 +234,7 @@ RC_GTEST_PROP(SampsonResidual, JacobianMatchesNumericOne, (std::uint64_t seed))
     Eigen::Matrix3d minus = f;
     plus(k / 3, k % 3) += STEP;
     minus(k / 3, k % 3) -= STEP;
-    const double numeric =
-        (sampsonResidual(plus, pair, unused) - sampsonResidual(minus, pair, unused)) / (2.0 * STEP);
+    const double numeric = (sampsonResidual(plus, pair, unused) - sampsonResidual(minus, pair, unused)) / (2.0 * STEP);
     RC_ASSERT(std::abs(jacobian(k) - numeric) < 1e-5 * (1.0 + std::abs(numeric)));
   }
 }
@@ -290,8 +289,8 @@ TEST(RefineFundamental, NoNearbyMatrixOfRankTwoIsBetter)
 {
   Rng rng(12);
   const test::Scene scene = makeScene(60, 1.0, 12);
-  const Eigen::Matrix3d refined = refineFundamental(*fundamentalFromPoints(scene.pairs), scene.pairs,
-                                                    std::numeric_limits<double>::infinity(), 100);
+  const Eigen::Matrix3d refined =
+      refineFundamental(*fundamentalFromPoints(scene.pairs), scene.pairs, std::numeric_limits<double>::infinity(), 100);
   const double error = totalError(refined, scene.pairs);
   for (int i = 0; i < 100; ++i)
   {

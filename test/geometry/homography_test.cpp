@@ -5,10 +5,10 @@
 #include "../../src/geometry/residuals.h"
 #include "../support/synthetic_scene.h"
 
-#include <Eigen/Geometry>
-#include <Eigen/LU>
 #include <gtest/gtest.h>
 #include <rapidcheck/gtest.h>
+#include <Eigen/Geometry>
+#include <Eigen/LU>
 
 #include <cmath>
 #include <limits>

@@ -16,8 +16,9 @@ namespace
 TEST(Config, PointMatcherHasEveryParameterAtItsDefault)
 {
   const YAML::Node config = YAML::LoadFile(CONFIG_DIR "/point_matcher.yaml");
-  const std::vector<std::string> of_the_node = { "view",        "rate",       "views_dir",    "allow_paths",
-                                                 "image_transport", "queue_size", "max_image_age" };
+  const std::vector<std::string> of_the_node = {
+    "view", "rate", "views_dir", "allow_paths", "image_transport", "queue_size", "max_image_age"
+  };
   ViewMatcherParams params;
   const std::vector<Parameter> table = matcherParameters(params);
   EXPECT_EQ(config.size(), of_the_node.size() + table.size());

@@ -5,9 +5,9 @@
 #include "view_servo/views/image_io.h"
 
 #include <gtest/gtest.h>
+#include <sensor_msgs/image_encodings.h>
 #include <opencv2/core.hpp>
 #include <opencv2/imgproc.hpp>
-#include <sensor_msgs/image_encodings.h>
 
 #include <array>
 #include <cmath>
@@ -128,12 +128,14 @@ TEST(ImageConversion, TurnsEveryEncodingIntoTheSameGrey)
   const cv::Mat bgr = examplePicture();
   cv::Mat grey;
   cv::cvtColor(bgr, grey, cv::COLOR_BGR2GRAY);
-  const auto convert = [&](int code) {
+  const auto convert = [&](int code)
+  {
     cv::Mat result;
     cv::cvtColor(bgr, result, code);
     return result;
   };
-  const auto wide = [](const cv::Mat& image) {
+  const auto wide = [](const cv::Mat& image)
+  {
     cv::Mat result;
     image.convertTo(result, CV_16U, 257.0);
     return result;

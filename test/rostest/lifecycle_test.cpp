@@ -1,6 +1,7 @@
 // Copyright (c) 2026, the view_servo authors
 // SPDX-License-Identifier: BSD-3-Clause
 #include "node_test.h"
+#include "support/temporary_directory.h"
 
 #include "view_servo/ListViews.h"
 #include "view_servo/MatchPoints.h"
@@ -14,6 +15,7 @@
 #include <spawn.h>
 #include <sys/wait.h>
 
+#include <cstdlib>
 #include <fstream>
 #include <iterator>
 #include <optional>
@@ -239,8 +241,7 @@ TEST_F(LifecycleTest, StopsAtOnceWhileMatching)
   const FakeCamera camera("camera");
   const Recorder<PointMatches> matches("stopped/point_matches");
   const cv::Mat seen = warped(picture, exampleHomography());
-  ASSERT_TRUE(
-      waitUntil([&] { return matches.last().has_value(); }, [&] { camera.publish(seen, ros::Time::now()); }));
+  ASSERT_TRUE(waitUntil([&] { return matches.last().has_value(); }, [&] { camera.publish(seen, ros::Time::now()); }));
   const ros::WallTime start = ros::WallTime::now();
   node.interrupt();
   EXPECT_EQ(node.exitStatus(), 0) << node.output();

@@ -1,6 +1,7 @@
 // Copyright (c) 2026, the view_servo authors
 // SPDX-License-Identifier: BSD-3-Clause
 #include "node_test.h"
+#include "support/temporary_directory.h"
 
 #include "view_servo/MatchPoints.h"
 #include "view_servo/views/view_store.h"
@@ -245,7 +246,8 @@ TEST_F(MatchServiceTest, RefusesBadInputAndGoesOn)
   const std::string good = file("reference.png", picture_);
   std::ofstream((directory_.path() / "half.png").string(), std::ios::binary)
       << std::string(std::istreambuf_iterator<char>(std::ifstream(good, std::ios::binary).rdbuf()), {}).substr(0, 2000);
-  const std::string mirrored = [&] {
+  const std::string mirrored = [&]
+  {
     cv::Mat image;
     cv::flip(picture_, image, 1);
     return file("mirrored.png", image);
@@ -258,14 +260,18 @@ TEST_F(MatchServiceTest, RefusesBadInputAndGoesOn)
     std::function<void(MatchPoints::Request&)> spoil;
     std::string naming;
   };
-  const auto query = [](const std::string& path) {
-    return [path](MatchPoints::Request& request) {
+  const auto query = [](const std::string& path)
+  {
+    return [path](MatchPoints::Request& request)
+    {
       request.query = ImageSource();
       request.query.path = path;
     };
   };
-  const auto view = [](const std::string& name) {
-    return [name](MatchPoints::Request& request) {
+  const auto view = [](const std::string& name)
+  {
+    return [name](MatchPoints::Request& request)
+    {
       request.reference = ImageSource();
       request.reference.view = name;
     };
@@ -286,15 +292,21 @@ TEST_F(MatchServiceTest, RefusesBadInputAndGoesOn)
     { "name with ../", view("../wall"), "../wall" },
     { "name with /", view("a/b"), "a/b" },
     { "two fields", [&](MatchPoints::Request& request) { request.query.path = good; }, "path and image" },
-    { "no field and no camera", [](MatchPoints::Request& request) { request.query = ImageSource(); }, "/open/image_raw" },
+    { "no field and no camera", [](MatchPoints::Request& request) { request.query = ImageSource(); },
+      "/open/image_raw" },
     { "model", [](MatchPoints::Request& request) { request.model = "affine"; }, "affine" },
     { "threshold", [](MatchPoints::Request& request) { request.inlier_threshold = -1.0; }, "inlier_threshold" },
     { "threshold NaN", [=](MatchPoints::Request& request) { request.inlier_threshold = not_a_number; },
       "inlier_threshold" },
     { "unknown encoding", [](MatchPoints::Request& request) { request.query.image.encoding = "h264"; }, "h264" },
     { "data missing", [](MatchPoints::Request& request) { request.query.image.data.resize(100); }, "query.image" },
-    { "data only", [](MatchPoints::Request& request) { request.query.image = sensor_msgs::Image();
-                                                       request.query.image.data.resize(100); }, "query.image" },
+    { "data only",
+      [](MatchPoints::Request& request)
+      {
+        request.query.image = sensor_msgs::Image();
+        request.query.image.data.resize(100);
+      },
+      "query.image" },
   };
   for (const Case& bad : cases)
   {

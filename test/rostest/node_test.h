@@ -4,21 +4,20 @@
 
 #include "view_servo/ros/conversions.h"
 
-#include <Eigen/Core>
-#include <Eigen/LU>
 #include <gtest/gtest.h>
-#include <opencv2/core.hpp>
-#include <opencv2/core/eigen.hpp>
-#include <opencv2/imgproc.hpp>
 #include <ros/ros.h>
 #include <sensor_msgs/CameraInfo.h>
 #include <sensor_msgs/Image.h>
 #include <sensor_msgs/image_encodings.h>
+#include <Eigen/Core>
+#include <Eigen/LU>
+#include <opencv2/core.hpp>
+#include <opencv2/core/eigen.hpp>
+#include <opencv2/imgproc.hpp>
 
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
-#include <cstdlib>
 #include <deque>
 #include <filesystem>
 #include <functional>
@@ -26,6 +25,7 @@
 #include <optional>
 #include <stdexcept>
 #include <string>
+#include <vector>
 
 namespace view_servo
 {
@@ -109,35 +109,6 @@ private:
   mutable std::mutex mutex_;
   std::deque<Message> messages_;
   ros::Subscriber subscriber_;
-};
-
-/** A directory that goes with the object. */
-class TemporaryDirectory
-{
-public:
-  TemporaryDirectory()
-  {
-    std::string name = (std::filesystem::temp_directory_path() / "view_servo_XXXXXX").string();
-    if (mkdtemp(name.data()) == nullptr)
-    {
-      throw std::runtime_error("no temporary directory");
-    }
-    path_ = name;
-  }
-  ~TemporaryDirectory()
-  {
-    std::filesystem::remove_all(path_);
-  }
-  TemporaryDirectory(const TemporaryDirectory&) = delete;
-  TemporaryDirectory& operator=(const TemporaryDirectory&) = delete;
-
-  const std::filesystem::path& path() const
-  {
-    return path_;
-  }
-
-private:
-  std::filesystem::path path_;
 };
 
 /** A textured plane, another one for each seed: patches of many sizes and greys on a slowly varying ground. */
@@ -224,9 +195,8 @@ public:
 
   bool waitForSubscribers(std::uint32_t count) const
   {
-    return waitUntil([&] {
-      return image_publisher_.getNumSubscribers() >= count && info_publisher_.getNumSubscribers() >= count;
-    });
+    return waitUntil(
+        [&] { return image_publisher_.getNumSubscribers() >= count && info_publisher_.getNumSubscribers() >= count; });
   }
 
   void publish(const cv::Mat& image, const ros::Time& stamp) const

@@ -81,7 +81,8 @@ TEST_F(SimTimeTest, ForgetsTheFutureWhenTimeJumpsBack)
   double now = 1000.0;
   MatchPoints::Response response;
   EXPECT_TRUE(waitUntil(
-      [&] {
+      [&]
+      {
         response = match();
         return static_cast<bool>(response.success);
       },
@@ -91,7 +92,8 @@ TEST_F(SimTimeTest, ForgetsTheFutureWhenTimeJumpsBack)
   // The bag starts again: the last image is one of the future until the camera has sent another.
   now = 10.0;
   EXPECT_TRUE(waitUntil(
-      [&] {
+      [&]
+      {
         response = match();
         return !response.success;
       },
@@ -99,7 +101,8 @@ TEST_F(SimTimeTest, ForgetsTheFutureWhenTimeJumpsBack)
   EXPECT_NE(response.message.find("future"), std::string::npos) << response.message;
 
   EXPECT_TRUE(waitUntil(
-      [&] {
+      [&]
+      {
         response = match();
         return static_cast<bool>(response.success);
       },
@@ -118,8 +121,8 @@ TEST_F(SimTimeTest, StreamsOnAfterTimeJumpsBack)
   EXPECT_TRUE(waitUntil([&] { return matches.last() && matches.last()->header.stamp > ros::Time(2000.0); },
                         [&] { play(now += 0.1, true); }));
   now = 20.0;
-  EXPECT_TRUE(waitUntil([&] { return matches.last()->header.stamp < ros::Time(1000.0); },
-                        [&] { play(now += 0.1, true); }));
+  EXPECT_TRUE(
+      waitUntil([&] { return matches.last()->header.stamp < ros::Time(1000.0); }, [&] { play(now += 0.1, true); }));
 }
 
 }  // namespace

@@ -1,6 +1,7 @@
 // Copyright (c) 2026, the view_servo authors
 // SPDX-License-Identifier: BSD-3-Clause
 #include "node_test.h"
+#include "support/temporary_directory.h"
 
 #include "view_servo/DeleteView.h"
 #include "view_servo/GetView.h"
@@ -10,8 +11,8 @@
 
 #include <geometry_msgs/TransformStamped.h>
 #include <gtest/gtest.h>
-#include <opencv2/imgcodecs.hpp>
 #include <tf2_ros/static_transform_broadcaster.h>
+#include <opencv2/imgcodecs.hpp>
 
 #include <algorithm>
 #include <cmath>
@@ -103,12 +104,14 @@ TEST_F(ViewStoreNodeTest, StoresTheCameraImageWithAllThatIsKnown)
   GetView::Response view;
   ros::Time sent;
   ASSERT_TRUE(waitUntil(
-      [&] {
+      [&]
+      {
         const SaveView::Response response = call<SaveView>("save", request);
         view = get("desk");
         return response.success && view.has_pose;
       },
-      [&] {
+      [&]
+      {
         sent = ros::Time::now();
         camera_.publish(picture_, sent);
       }))
@@ -266,7 +269,8 @@ TEST_F(ViewStoreNodeTest, RefusesToStoreAnUncalibratedCamera)
   request.name = "never";
   SaveView::Response response;
   EXPECT_TRUE(waitUntil(
-      [&] {
+      [&]
+      {
         response = call<SaveView>("save", request);
         return response.message.find("not calibrated") != std::string::npos;
       },

@@ -51,8 +51,8 @@ inline Eigen::Matrix3d randomRotation(Rng& rng, double deviation)
   const double x = deviation * gaussian(rng);
   const double y = deviation * gaussian(rng);
   const Eigen::Vector3d v(x, y, deviation * gaussian(rng));
-  return v.norm() > 0.0 ? Eigen::AngleAxisd(v.norm(), v.normalized()).toRotationMatrix() :
-                          Eigen::Matrix3d(Eigen::Matrix3d::Identity());
+  return v.norm() > 0.0 ? Eigen::AngleAxisd(v.norm(), v.normalized()).toRotationMatrix()
+                        : Eigen::Matrix3d(Eigen::Matrix3d::Identity());
 }
 
 inline Eigen::Matrix3d crossMatrix(const Eigen::Vector3d& v)
@@ -74,10 +74,10 @@ struct SceneOptions
 /** Two perspective views of random points 3 to 6 units away; the cameras look at the same part of space. */
 struct Scene
 {
-  Eigen::Matrix3d k;            ///< camera matrix of both views
-  Eigen::Matrix3d r;            ///< X_cur = R X_ref + t
+  Eigen::Matrix3d k;  ///< camera matrix of both views
+  Eigen::Matrix3d r;  ///< X_cur = R X_ref + t
   Eigen::Vector3d t;
-  Eigen::Vector3d n;            ///< plane n^T X_ref = d; meets the points of a planar scene only
+  Eigen::Vector3d n;  ///< plane n^T X_ref = d; meets the points of a planar scene only
   double d;
   Eigen::Matrix3d homography;   ///< of the plane, reference -> current, norm 1
   Eigen::Matrix3d fundamental;  ///< x_cur^T F x_ref = 0, norm 1
@@ -103,7 +103,8 @@ inline Scene makeScene(const SceneOptions& options, Rng& rng)
   scene.homography = (scene.k * (scene.r + scene.t * scene.n.transpose() / scene.d) * k_inverse).normalized();
   scene.fundamental = (k_inverse.transpose() * crossMatrix(scene.t) * scene.r * k_inverse).normalized();
 
-  const auto noise = [&] {
+  const auto noise = [&]
+  {
     const double u = options.noise * gaussian(rng);
     return Eigen::Vector2d(u, options.noise * gaussian(rng));
   };

@@ -2,11 +2,11 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "view_servo/views/view_cache.h"
 
+#include "support/temporary_directory.h"
+
 #include <gtest/gtest.h>
 #include <opencv2/core.hpp>
 
-#include <cstdlib>
-#include <filesystem>
 #include <memory>
 #include <string>
 
@@ -17,34 +17,22 @@ namespace
 class ViewCacheTest : public ::testing::Test
 {
 protected:
-  void SetUp() override
-  {
-    std::string name = (std::filesystem::temp_directory_path() / "view_cache_XXXXXX").string();
-    ASSERT_NE(mkdtemp(name.data()), nullptr);
-    directory_ = name;
-  }
-
-  void TearDown() override
-  {
-    std::filesystem::remove_all(directory_);
-  }
-
   void save(const std::string& name, int grey) const
   {
     StoredView view;
     view.name = name;
     view.image = cv::Mat(64, 64, CV_8UC1, cv::Scalar(grey));
     view.region = cv::Rect(8, 8, 32, 32);
-    ViewStore(directory_).save(view, true);
+    ViewStore(directory_.path()).save(view, true);
   }
 
-  std::filesystem::path directory_;
+  test::TemporaryDirectory directory_;
 };
 
 TEST_F(ViewCacheTest, ReadsAViewOnce)
 {
   save("desk", 10);
-  ViewCache cache{ ViewStore(directory_), PointMatcherParams() };
+  ViewCache cache{ ViewStore(directory_.path()), PointMatcherParams() };
   const std::shared_ptr<const PreparedImage> first = cache.get("desk");
   EXPECT_EQ(first->grey().at<uchar>(0, 0), 10);
   EXPECT_EQ(first->region(), cv::Rect(8, 8, 32, 32));
@@ -54,7 +42,7 @@ TEST_F(ViewCacheTest, ReadsAViewOnce)
 TEST_F(ViewCacheTest, ReadsAViewAgainThatWasSavedAnew)
 {
   save("desk", 10);
-  ViewCache cache{ ViewStore(directory_), PointMatcherParams() };
+  ViewCache cache{ ViewStore(directory_.path()), PointMatcherParams() };
   const std::shared_ptr<const PreparedImage> first = cache.get("desk");
   save("desk", 20);
   EXPECT_EQ(cache.get("desk")->grey().at<uchar>(0, 0), 20);
@@ -66,7 +54,7 @@ TEST_F(ViewCacheTest, ForgetsTheViewUsedLongestAgo)
   save("a", 1);
   save("b", 2);
   save("c", 3);
-  ViewCache cache{ ViewStore(directory_), PointMatcherParams(), 2 };
+  ViewCache cache{ ViewStore(directory_.path()), PointMatcherParams(), 2 };
   const std::shared_ptr<const PreparedImage> a = cache.get("a");
   const std::shared_ptr<const PreparedImage> b = cache.get("b");
   cache.get("a");
@@ -78,9 +66,9 @@ TEST_F(ViewCacheTest, ForgetsTheViewUsedLongestAgo)
 TEST_F(ViewCacheTest, DoesNotServeAViewThatIsGone)
 {
   save("desk", 10);
-  ViewCache cache{ ViewStore(directory_), PointMatcherParams() };
+  ViewCache cache{ ViewStore(directory_.path()), PointMatcherParams() };
   cache.get("desk");
-  ViewStore(directory_).remove("desk");
+  ViewStore(directory_.path()).remove("desk");
   EXPECT_THROW(cache.get("desk"), ViewStoreError);
   EXPECT_THROW(cache.get("../desk"), ViewStoreError);
 }

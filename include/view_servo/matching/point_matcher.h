@@ -30,7 +30,7 @@ struct PointMatcherParams
   AssignmentMethod assignment = AssignmentMethod::EXACT;
   bool cyclic_order = true;      ///< weigh associations by cyclic alignment of the profiles that voted (ch. 7)
   double min_correlation = 0.7;  ///< profiles correlated less do not align (7.3), [0, 1)
-  int cyclic_entries = 8;        ///< aligned are a row's and a column's entries with that many most votes; 0 = all
+  int cyclic_entries = 5;        ///< aligned are a row's and a column's entries with that many most votes; 0 = all
 
   /** All faults, one a line; empty when the parameters are usable. */
   std::vector<std::string> validate() const;

@@ -22,7 +22,7 @@ struct ProfileSearchParams
   ProfileSearch search = ProfileSearch::NEAREST;
   int neighbours = 12;   ///< K_v (NEAREST), >= 1; the thesis has 25, which finds 2 % more and takes 1.6 times as long
   double radius = 0.5;   ///< D_v (RADIUS) [standard deviations of a feature], > 0
-  double epsilon = 6.0;  ///< a missed neighbour is at most (1 + epsilon) times nearer than those found (NEAREST), >= 0
+  double epsilon = 3.0;  ///< a missed neighbour is at most (1 + epsilon) times nearer than those found (NEAREST), >= 0
 
   /** All faults, one a line; empty when the parameters are usable. */
   std::vector<std::string> validate() const;

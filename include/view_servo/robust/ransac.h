@@ -26,13 +26,13 @@ enum class Sampling
 /** Options of the one RANSAC loop. */
 struct RansacParams
 {
-  double inlier_threshold = 3.0;  ///< largest error of an inlier [px], > 0
-  double confidence = 0.999;      ///< wanted probability that an outlier-free sample was drawn, (0, 1)
-  int min_iterations = 100;       ///< samples solved before the adaptive stop (thesis eq. 9.5) may end it, >= 0
-  int max_iterations = 2000;      ///< samples solved at most, >= 1
-  int max_rejected = 50000;       ///< samples that the estimator's cheap test may refuse, in all, >= 0
-  int local_optimizations = 10;   ///< refits to the inliers of a new best model (Chum, Matas & Kittler 2003), 0 = off
-  bool improvement_stage = false; ///< thesis 9.4: replace each datum of the best sample by every other one in turn
+  double inlier_threshold = 3.0;   ///< largest error of an inlier [px], > 0
+  double confidence = 0.999;       ///< wanted probability that an outlier-free sample was drawn, (0, 1)
+  int min_iterations = 100;        ///< samples solved before the adaptive stop (thesis eq. 9.5) may end it, >= 0
+  int max_iterations = 2000;       ///< random samples solved at most, >= 1
+  int max_rejected = 50000;        ///< samples the estimator's cheap test may refuse in all (one more ends it), >= 0
+  int local_optimizations = 10;    ///< refits to the inliers of a new best model (Chum, Matas & Kittler 2003), 0 = off
+  bool improvement_stage = false;  ///< thesis 9.4: replace each datum of the best sample by every other one in turn
   Sampling sampling = Sampling::PROGRESSIVE;
 
   /** All faults, one a line; empty when the parameters are usable. */
@@ -49,7 +49,7 @@ enum class RansacStop
 
 struct RansacStatistics
 {
-  int iterations = 0;           ///< samples solved
+  int iterations = 0;           ///< random samples solved (those of the improvement stage come on top)
   int rejected_samples = 0;     ///< samples refused by the estimator before solving
   int models = 0;               ///< models scored
   int local_optimizations = 0;  ///< refits that improved the best model

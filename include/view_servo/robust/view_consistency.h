@@ -14,15 +14,15 @@ namespace view_servo
  * Violation, in [0, 1], of the view constraint on five points seen in two scaled-orthographic views (thesis eq. 6.5,
  * 6.6; Carlsson 2000): zero for exact data, whatever the scales. The printed constraint depends on the units; here each
  * view's points are normalised (centroid 0, RMS distance 1) and the determinant is divided by the lengths of its rows.
- * Degenerate groups (all points coincide in a view, or a row vanishes) return 1.
+ * Degenerate groups (all points coincide in a view, or a row vanishes, as it does for points on one plane) return 1.
  */
 double viewConstraint(const std::array<Correspondence, 5>& five);
 
 struct ViewConsistencyParams
 {
-  double threshold = 0.1;        ///< a group of five is consistent below this violation, (0, 1]
-  double mean_increments = 20.0; ///< stop when the candidates were counted this often on average, > 0
-  int max_groups = 200000;       ///< groups drawn at most, >= 1
+  double threshold = 0.03;         ///< a group of five is consistent below this violation, (0, 1]
+  double mean_increments = 100.0;  ///< stop when the candidates were counted this often on average, > 0
+  int max_groups = 200000;         ///< groups drawn at most, >= 1
 
   /** All faults, one a line; empty when the parameters are usable. */
   std::vector<std::string> validate() const;

@@ -44,9 +44,9 @@ struct CameraInputParams
  *  - `~queue_size` (int, default 5, >= 1): images that wait for their camera_info, and the other way round;
  *  - `~max_image_age` (double, default 1.0 [s], > 0): an older image is not the camera's present view.
  *
- * A frame that cannot be used (camera not calibrated, or calibrated for another size) is dropped, with a throttled error
- * that names both topics; so is the lack of either topic, or of common stamps. Images are kept by stamp, not by arrival:
- * when time jumps back (a bag that loops), those from the future count as too old.
+ * A frame that cannot be used (camera not calibrated, or calibrated for another size) is dropped, with a throttled
+ * error that names both topics; so are messages of which none have a common stamp. An image from the future is as bad
+ * as an old one: time jumped back, as when a bag loops.
  */
 class CameraInput
 {
@@ -76,12 +76,12 @@ private:
   Callback on_frame_;
   mutable std::mutex mutex_;
   CameraFrame latest_;
-  std::string problem_;         // why the last frame was not usable, or none came
-  int images_ = 0;              // since the last check
+  std::string problem_;  // why the last frame was not usable, or none came
+  int images_ = 0;       // since the last check
   int infos_ = 0;
   int pairs_ = 0;
-  double rate_ = 0.0;           // of usable frames [Hz]
-  int frames_ = 0;              // usable, since the last diagnosis
+  double rate_ = 0.0;  // of usable frames [Hz]
+  int frames_ = 0;     // usable, since the last diagnosis
   ros::WallTime last_diagnosis_;
 
   image_transport::ImageTransport transport_;

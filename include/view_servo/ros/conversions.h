@@ -8,14 +8,14 @@
 #include "view_servo/views/view_matcher.h"
 #include "view_servo/views/view_store.h"
 
-#include <Eigen/Core>
 #include <geometry_msgs/PoseStamped.h>
 #include <geometry_msgs/TransformStamped.h>
-#include <opencv2/core/mat.hpp>
 #include <sensor_msgs/CameraInfo.h>
 #include <sensor_msgs/Image.h>
 #include <sensor_msgs/RegionOfInterest.h>
 #include <std_msgs/Header.h>
+#include <Eigen/Core>
+#include <opencv2/core/mat.hpp>
 
 #include <string>
 #include <vector>

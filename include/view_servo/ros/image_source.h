@@ -7,9 +7,9 @@
 #include "view_servo/ros/parameters.h"
 #include "view_servo/views/view_store.h"
 
+#include <std_msgs/Header.h>
 #include <opencv2/core/mat.hpp>
 #include <opencv2/core/types.hpp>
-#include <std_msgs/Header.h>
 
 #include <filesystem>
 #include <optional>

@@ -6,8 +6,10 @@
 #include <ros/console.h>
 #include <ros/init.h>
 #include <ros/node_handle.h>
+#include <ros/service_server.h>
 #include <ros/spinner.h>
 #include <ros/wall_timer.h>
+#include <boost/function.hpp>
 
 #include <cstdint>
 #include <exception>
@@ -15,9 +17,12 @@
 
 namespace view_servo
 {
+/** An exception's text without line breaks. */
+std::string oneLine(const std::exception& error);
+
 /**
- * What all nodes share: handles, and `/diagnostics` once a second of wall time, so that it goes on when a bag's clock
- * does not.
+ * What all nodes share: handles, services that answer whatever happens, and `/diagnostics` once a second of wall time,
+ * so that it goes on when a bag's clock does not.
  */
 class NodeBase
 {
@@ -29,6 +34,30 @@ protected:
   NodeBase(const ros::NodeHandle& nh, const ros::NodeHandle& private_nh);
   ~NodeBase() = default;
 
+  /**
+   * Offers a private service; what `method` throws becomes success = false and the message.
+   * @return the service's handle, to be kept.
+   */
+  template <typename Node, typename Request, typename Response>
+  ros::ServiceServer serve(const std::string& name, void (Node::*method)(const Request&, Response&), Node* node)
+  {
+    const boost::function<bool(Request&, Response&)> callback = [method, node](Request& request, Response& response)
+    {
+      try
+      {
+        (node->*method)(request, response);
+      }
+      catch (const std::exception& error)
+      {
+        response.success = false;
+        response.message = oneLine(error);
+        ROS_WARN_STREAM(response.message);
+      }
+      return true;
+    };
+    return private_nh_.advertiseService(name, callback);
+  }
+
   ros::NodeHandle nh_;
   ros::NodeHandle private_nh_;
   diagnostic_updater::Updater diagnostics_;
@@ -36,29 +65,6 @@ protected:
 private:
   ros::WallTimer diagnostics_timer_;
 };
-
-/** An exception's text without line breaks. */
-std::string oneLine(const std::exception& error);
-
-/**
- * Runs a service: whatever it throws becomes success = false and the message.
- * @return what a service callback returns: the request was answered.
- */
-template <typename Response, typename Function>
-bool answer(Response& response, Function&& function)
-{
-  try
-  {
-    function();
-  }
-  catch (const std::exception& error)
-  {
-    response.success = false;
-    response.message = oneLine(error);
-    ROS_WARN_STREAM(response.message);
-  }
-  return true;
-}
 
 /**
  * A node's main(): spins on a few threads, so that images go on arriving while a service works.
@@ -69,9 +75,10 @@ int runNode(int argc, char** argv, const std::string& name)
 {
   constexpr std::uint32_t SPINNER_THREADS = 3;
   ros::init(argc, argv, name);
+  const ros::NodeHandle nh;  // outlives the node: without any handle, ROS ends and the last words are lost
   try
   {
-    Node node{ ros::NodeHandle(), ros::NodeHandle("~") };
+    Node node(nh, ros::NodeHandle("~"));
     ros::MultiThreadedSpinner(SPINNER_THREADS).spin();
     return 0;
   }

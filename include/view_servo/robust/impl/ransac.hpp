@@ -59,10 +59,10 @@ public:
 private:
   std::size_t count_;
   std::size_t size_;
-  std::size_t prefix_;       ///< n: samples come from the best n data
-  double prefix_samples_;    ///< T_n: samples expected from within the best n, real-valued
-  double samples_drawn_;     ///< t
-  double samples_to_grow_;   ///< T'_n: n grows when t passes it
+  std::size_t prefix_;      ///< n: samples come from the best n data
+  double prefix_samples_;   ///< T_n: samples expected from within the best n, real-valued
+  double samples_drawn_;    ///< t
+  double samples_to_grow_;  ///< T'_n: n grows when t passes it
 };
 
 /** Samples needed for one free of outliers with the given confidence (thesis eq. 9.5); possibly infinite. */
@@ -76,10 +76,10 @@ public:
   using Model = typename Estimator::Model;
 
   RansacLoop(const Estimator& estimator, const RansacParams& params, Rng& rng)
-    : estimator_(estimator)
-    , params_(params)
-    , rng_(rng)
-    , squared_threshold_(params.inlier_threshold * params.inlier_threshold)
+    : estimator_(estimator),
+      params_(params),
+      rng_(rng),
+      squared_threshold_(params.inlier_threshold * params.inlier_threshold)
   {
   }
 

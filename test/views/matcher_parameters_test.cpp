@@ -1,0 +1,136 @@
+// Copyright (c) 2026, the view_servo authors
+// SPDX-License-Identifier: BSD-3-Clause
+#include "view_servo/views/matcher_parameters.h"
+
+#include <gtest/gtest.h>
+
+#include <set>
+#include <stdexcept>
+#include <string>
+
+namespace
+{
+using view_servo::matcherParameters;
+using view_servo::Parameter;
+using view_servo::setParameter;
+using view_servo::ViewMatcherParams;
+
+TEST(MatcherParameters, HaveUniqueDocumentedNames)
+{
+  ViewMatcherParams params;
+  std::set<std::string> names;
+  for (const Parameter& parameter : matcherParameters(params))
+  {
+    EXPECT_TRUE(names.insert(parameter.name).second) << parameter.name;
+    EXPECT_FALSE(parameter.description.empty()) << parameter.name;
+    EXPECT_FALSE(parameter.type.empty()) << parameter.name;
+  }
+  EXPECT_GT(names.size(), 30U);
+}
+
+TEST(MatcherParameters, ReadBackWhatTheyPrint)
+{
+  ViewMatcherParams params;
+  for (const Parameter& parameter : matcherParameters(params))
+  {
+    const std::string before = parameter.get();
+    EXPECT_TRUE(parameter.set(before)) << parameter.name << " = " << before;
+    EXPECT_EQ(parameter.get(), before) << parameter.name;
+  }
+}
+
+TEST(MatcherParameters, EachSetsSomethingOfItsOwn)
+{
+  // Another value for each changes what its name reads, and nothing else.
+  ViewMatcherParams params;
+  const auto table = matcherParameters(params);
+  for (const Parameter& parameter : table)
+  {
+    const std::string before = parameter.get();
+    std::string other;
+    if (parameter.type == "int" || parameter.type == "double")
+    {
+      other = before == "3" ? "4" : "3";
+    }
+    else if (parameter.type == "bool")
+    {
+      other = before == "true" ? "false" : "true";
+    }
+    else
+    {
+      const std::string first = parameter.type.substr(0, parameter.type.find('|'));
+      const std::string last = parameter.type.substr(parameter.type.rfind('|') + 1);
+      other = before == first ? last : first;
+    }
+    std::vector<std::string> others;
+    for (const Parameter& beside : table)
+    {
+      others.push_back(beside.get());
+    }
+    ASSERT_TRUE(parameter.set(other)) << parameter.name;
+    EXPECT_EQ(parameter.get(), other);
+    for (std::size_t i = 0; i < table.size(); ++i)
+    {
+      EXPECT_TRUE(table[i].name == parameter.name || table[i].get() == others[i])
+          << parameter.name << " changed " << table[i].name;
+    }
+    parameter.set(before);
+  }
+}
+
+TEST(SetParameter, SetsNumbersWordsAndSwitches)
+{
+  ViewMatcherParams params;
+  setParameter(params, "max_corners", "321");
+  setParameter(params, "inlier_threshold", "2.5");
+  setParameter(params, "cyclic_order", "false");
+  setParameter(params, "search", "radius");
+  setParameter(params, "seed", "12345678901");
+  EXPECT_EQ(params.points.corners.max_corners, 321);
+  EXPECT_EQ(params.ransac.inlier_threshold, 2.5);
+  EXPECT_FALSE(params.points.cyclic_order);
+  EXPECT_EQ(params.points.search.search, view_servo::ProfileSearch::RADIUS);
+  EXPECT_EQ(params.seed, 12345678901U);
+}
+
+TEST(SetParameter, NamesTheNearestWhenAskedForOneThatIsNot)
+{
+  ViewMatcherParams params;
+  try
+  {
+    setParameter(params, "max_corner", "10");
+    FAIL() << "an unknown name was accepted";
+  }
+  catch (const std::invalid_argument& error)
+  {
+    EXPECT_NE(std::string(error.what()).find("'max_corner'"), std::string::npos);
+    EXPECT_NE(std::string(error.what()).find("'max_corners'"), std::string::npos);
+  }
+}
+
+TEST(SetParameter, RefusesValuesOfTheWrongTypeAndLeavesAllAsItWas)
+{
+  ViewMatcherParams params;
+  for (const auto& [name, value] :
+       std::vector<std::pair<std::string, std::string>>{ { "max_corners", "many" },
+                                                         { "max_corners", "3.5" },
+                                                         { "max_corners", "" },
+                                                         { "max_corners", "99999999999999999999" },
+                                                         { "inlier_threshold", "nan" },
+                                                         { "inlier_threshold", "2,5" },
+                                                         { "cyclic_order", "yes" },
+                                                         { "search", "both" },
+                                                         { "seed", "-1" } })
+  {
+    EXPECT_THROW(setParameter(params, name, value), std::invalid_argument) << name << " = '" << value << "'";
+  }
+  ViewMatcherParams fresh;
+  const auto now = matcherParameters(params);
+  const auto then = matcherParameters(fresh);
+  for (std::size_t i = 0; i < now.size(); ++i)
+  {
+    EXPECT_EQ(now[i].get(), then[i].get());
+  }
+}
+
+}  // namespace

@@ -1,0 +1,108 @@
+// Copyright (c) 2026, the view_servo authors
+// SPDX-License-Identifier: BSD-3-Clause
+#include "view_servo/views/prepared_image.h"
+
+#include "support/textured_plane.h"
+
+#include <Eigen/Geometry>
+#include <gtest/gtest.h>
+#include <opencv2/core.hpp>
+
+#include <atomic>
+#include <cmath>
+#include <stdexcept>
+#include <thread>
+#include <vector>
+
+namespace
+{
+using view_servo::Corner;
+using view_servo::PointMatcherParams;
+using view_servo::PreparedImage;
+using view_servo::test::texturedPicture;
+
+TEST(PreparedImage, LevelsShrinkByTheRootOfTwoAndMapBack)
+{
+  const PreparedImage image(texturedPicture(1), cv::Rect(), PointMatcherParams());
+  EXPECT_EQ(image.image(0).size(), cv::Size(480, 360));
+  EXPECT_EQ(image.image(1).size(), cv::Size(339, 255));
+  EXPECT_EQ(image.image(2).size(), cv::Size(240, 180));
+  EXPECT_EQ(image.toFull(0), Eigen::Matrix3d::Identity());
+  // The outer edges of the first and the last pixel stay where they are.
+  for (int level = 0; level < PreparedImage::LEVELS; ++level)
+  {
+    const cv::Size size = image.image(level).size();
+    const Eigen::Vector3d first = image.toFull(level) * Eigen::Vector3d(-0.5, -0.5, 1.0);
+    const Eigen::Vector3d last = image.toFull(level) * Eigen::Vector3d(size.width - 0.5, size.height - 0.5, 1.0);
+    EXPECT_NEAR((first.hnormalized() - Eigen::Vector2d(-0.5, -0.5)).norm(), 0.0, 1e-9);
+    EXPECT_NEAR((last.hnormalized() - Eigen::Vector2d(479.5, 359.5)).norm(), 0.0, 1e-9);
+  }
+}
+
+TEST(PreparedImage, ComputesItsFeaturesOnceForAllThreads)
+{
+  const PreparedImage image(texturedPicture(2), cv::Rect(), PointMatcherParams());
+  std::vector<std::thread> threads;
+  std::vector<const void*> seen(4);
+  for (std::size_t i = 0; i < seen.size(); ++i)
+  {
+    threads.emplace_back([&, i] { seen[i] = &image.profileIndex(0); });
+  }
+  for (std::thread& thread : threads)
+  {
+    thread.join();
+  }
+  for (const void* address : seen)
+  {
+    EXPECT_EQ(address, seen[0]);
+  }
+  EXPECT_EQ(&image.points(0), &image.points(0));
+  EXPECT_GT(image.points(0).corners.size(), 100U);
+}
+
+TEST(PreparedImage, LooksForFeaturesInItsRegionOnEveryLevel)
+{
+  const cv::Rect region(100, 60, 220, 200);
+  const PreparedImage image(texturedPicture(3), region, PointMatcherParams());
+  EXPECT_EQ(image.region(), region);
+  for (int level = 0; level < 3; ++level)
+  {
+    ASSERT_GT(image.points(level).corners.size(), 20U);
+    for (const Corner& corner : image.points(level).corners)
+    {
+      const Eigen::Vector2d full = (image.toFull(level) * corner.position.homogeneous()).hnormalized();
+      EXPECT_GE(full.x(), region.x - 3.0);
+      EXPECT_GE(full.y(), region.y - 3.0);
+      EXPECT_LE(full.x(), region.x + region.width + 3.0);
+      EXPECT_LE(full.y(), region.y + region.height + 3.0);
+    }
+  }
+}
+
+TEST(PreparedImage, HasNoFeaturesOnLevelsThatAreTooSmall)
+{
+  const PreparedImage image(texturedPicture(4, cv::Size(100, 90)), cv::Rect(), PointMatcherParams());
+  EXPECT_FALSE(image.image(0).empty());
+  EXPECT_TRUE(image.image(4).empty());
+  EXPECT_TRUE(image.points(4).corners.empty());
+  EXPECT_EQ(image.profileIndex(4).search(image.points(0).profiles, {}).size(), image.points(0).profiles.pairs.size());
+}
+
+TEST(PreparedImage, WithoutARegionTakesAll)
+{
+  const PreparedImage image(texturedPicture(1), cv::Rect(), PointMatcherParams());
+  EXPECT_EQ(image.region(), cv::Rect(0, 0, 480, 360));
+}
+
+TEST(PreparedImage, RefusesWhatItCannotUse)
+{
+  EXPECT_THROW(PreparedImage(cv::Mat(), cv::Rect(), PointMatcherParams()), std::invalid_argument);
+  EXPECT_THROW(PreparedImage(cv::Mat(90, 90, CV_8UC3), cv::Rect(), PointMatcherParams()), std::invalid_argument);
+  EXPECT_THROW(PreparedImage(texturedPicture(1), cv::Rect(400, 0, 100, 50), PointMatcherParams()),
+               std::invalid_argument);
+  const PreparedImage image(texturedPicture(1), cv::Rect(), PointMatcherParams());
+  EXPECT_THROW(image.points(PreparedImage::LEVELS), std::out_of_range);
+  EXPECT_THROW(image.points(-1), std::out_of_range);
+}
+
+}  // namespace

@@ -1,0 +1,309 @@
+// Copyright (c) 2026, the view_servo authors
+// SPDX-License-Identifier: BSD-3-Clause
+#include "view_servo/views/view_matcher.h"
+
+#include "view_servo/geometry/fundamental.h"
+
+#include "support/textured_plane.h"
+
+#include <Eigen/Geometry>
+#include <Eigen/LU>
+#include <gtest/gtest.h>
+#include <opencv2/core.hpp>
+#include <opencv2/imgproc.hpp>
+
+#include <cmath>
+#include <limits>
+#include <stdexcept>
+
+namespace
+{
+using view_servo::GeometryModel;
+using view_servo::MatchedPoint;
+using view_servo::MatchOutcome;
+using view_servo::PreparedImage;
+using view_servo::ViewConsistency;
+using view_servo::ViewMatch;
+using view_servo::ViewMatcher;
+using view_servo::ViewMatcherParams;
+using view_servo::test::blotchedPicture;
+using view_servo::test::cornerError;
+using view_servo::test::disturbed;
+using view_servo::test::exampleHomography;
+using view_servo::test::texturedPicture;
+using view_servo::test::warpedPicture;
+
+const cv::Size SIZE(480, 360);
+
+ViewMatch matchImages(const ViewMatcherParams& params, const cv::Mat& reference, const cv::Mat& current,
+                      GeometryModel model = GeometryModel::HOMOGRAPHY, const cv::Rect& region = cv::Rect())
+{
+  return ViewMatcher(params).match(PreparedImage(reference, region, params.points),
+                                   PreparedImage(current, cv::Rect(), params.points), model);
+}
+
+/** Two planes meeting in the middle of the reference like the pages of an open book, seen by two cameras. */
+struct Book
+{
+  Book()
+  {
+    Eigen::Matrix3d k;
+    k << 420.0, 0.0, 239.5, 0.0, 420.0, 179.5, 0.0, 0.0, 1.0;
+    const Eigen::Matrix3d rotation = Eigen::AngleAxisd(-0.25, Eigen::Vector3d::UnitY()).toRotationMatrix();
+    const Eigen::Vector3d translation(0.35, 0.05, 0.1);
+    Eigen::Matrix3d cross;
+    cross << 0.0, -translation.z(), translation.y(), translation.z(), 0.0, -translation.x(), -translation.y(),
+        translation.x(), 0.0;
+    fundamental = k.inverse().transpose() * cross * rotation * k.inverse();
+    fundamental.normalize();
+
+    reference = texturedPicture(21, SIZE);
+    current = cv::Mat(SIZE, CV_8UC1, cv::Scalar(128));
+    // Each page holds the line x = 0, z = 1.2 of the reference camera, its normal turned to one side.
+    for (const int side : { -1, 1 })
+    {
+      const Eigen::Vector3d normal = Eigen::Vector3d(0.6 * side, 0.0, 1.0).normalized();
+      const double distance = normal.z() * 1.2;
+      const Eigen::Matrix3d h = k * (rotation + translation * normal.transpose() / distance) * k.inverse();
+      const cv::Rect half(side < 0 ? 0 : SIZE.width / 2, 0, SIZE.width / 2, SIZE.height);
+      cv::Mat mask = cv::Mat::zeros(SIZE, CV_8UC1);
+      mask(half).setTo(255);
+      cv::Mat seen_mask;
+      cv::threshold(warpedMask(mask, h), seen_mask, 128, 255, cv::THRESH_BINARY);
+      warpedPicture(reference, h, SIZE).copyTo(current, seen_mask);
+    }
+  }
+
+  static cv::Mat warpedMask(const cv::Mat& mask, const Eigen::Matrix3d& h)
+  {
+    cv::Mat matrix;
+    cv::eigen2cv(h, matrix);
+    cv::Mat result;
+    cv::warpPerspective(mask, result, matrix, mask.size());
+    return result;
+  }
+
+  cv::Mat reference;
+  cv::Mat current;
+  Eigen::Matrix3d fundamental;
+};
+
+TEST(ViewMatcher, FindsThePlaneToAFractionOfAPixel)
+{
+  const cv::Mat reference = texturedPicture(1);
+  const cv::Mat current = disturbed(warpedPicture(reference, exampleHomography(), SIZE), 0.8, 10.0, 2.0);
+  const ViewMatch match = matchImages(ViewMatcherParams(), reference, current);
+  ASSERT_EQ(match.outcome, MatchOutcome::MATCHED) << match.message;
+  EXPECT_LT(cornerError(match.matrix, exampleHomography(), SIZE), 0.3);
+  EXPECT_EQ(match.matrix(2, 2), 1.0);
+  EXPECT_LT(match.rms_error, 1.0);
+  EXPECT_GT(match.log_significance, 50.0);
+  int inliers = 0;
+  for (const MatchedPoint& point : match.matches)
+  {
+    if (point.inlier)
+    {
+      ++inliers;
+      const Eigen::Vector2d predicted = (exampleHomography() * point.position.reference.homogeneous()).hnormalized();
+      EXPECT_LT((predicted - point.position.current).norm(), 4.0);
+    }
+  }
+  EXPECT_EQ(inliers, match.inliers);
+  EXPECT_GT(inliers, 150);
+}
+
+TEST(ViewMatcher, GuidedMatchingFindsMore)
+{
+  const cv::Mat reference = blotchedPicture(2, 2.0);
+  Eigen::Matrix3d steep;
+  steep << 0.45, 0.02, 90.0, -0.1, 0.85, 40.0, -6e-4, 1e-4, 1.0;
+  const cv::Mat current = disturbed(warpedPicture(reference, steep, SIZE), 0.7, 10.0, 4.0);
+  ViewMatcherParams params;
+  const ViewMatch guided = matchImages(params, reference, current);
+  params.guided = false;
+  const ViewMatch plain = matchImages(params, reference, current);
+  ASSERT_EQ(plain.outcome, MatchOutcome::MATCHED);
+  EXPECT_GT(guided.inliers, plain.inliers * 13 / 10);
+  EXPECT_LT(cornerError(guided.matrix, steep, SIZE), cornerError(plain.matrix, steep, SIZE));
+}
+
+TEST(ViewMatcher, FindsEpipolarGeometryOfASceneWithDepth)
+{
+  const Book book;
+  for (const ViewConsistency consistency : { ViewConsistency::OFF, ViewConsistency::BEFORE, ViewConsistency::WITHIN })
+  {
+    ViewMatcherParams params;
+    params.view_consistency = consistency;
+    const ViewMatch match = matchImages(params, book.reference, book.current, GeometryModel::FUNDAMENTAL);
+    ASSERT_EQ(match.outcome, MatchOutcome::MATCHED) << match.message;
+    EXPECT_GT(match.inliers, 80);
+    EXPECT_NEAR(match.matrix.norm(), 1.0, 1e-9);
+    EXPECT_NEAR(match.matrix.determinant(), 0.0, 1e-9);
+    int right = 0;
+    for (const MatchedPoint& point : match.matches)
+    {
+      right += point.inlier && view_servo::sampsonError(book.fundamental, point.position) < 4.0 ? 1 : 0;
+    }
+    EXPECT_GT(right, match.inliers * 8 / 10);
+  }
+}
+
+TEST(ViewMatcher, WorksWithUniformSamplingAndWithoutLocalOptimisation)
+{
+  const cv::Mat reference = texturedPicture(3);
+  const cv::Mat current = warpedPicture(reference, exampleHomography(), SIZE);
+  ViewMatcherParams params;
+  params.ransac.sampling = view_servo::Sampling::UNIFORM;
+  params.ransac.local_optimizations = 0;
+  params.ransac.improvement_stage = true;
+  const ViewMatch match = matchImages(params, reference, current);
+  ASSERT_EQ(match.outcome, MatchOutcome::MATCHED);
+  EXPECT_LT(cornerError(match.matrix, exampleHomography(), SIZE), 0.5);
+}
+
+TEST(ViewMatcher, FindsAViewThatIsMuchSmallerOrLarger)
+{
+  const cv::Mat reference = blotchedPicture(4, 1.5, cv::Size(800, 600));
+  Eigen::Matrix3d shrink = Eigen::Matrix3d::Identity();
+  shrink.topLeftCorner<2, 2>() = Eigen::Rotation2Dd(0.3).toRotationMatrix() / 2.8;
+  shrink(0, 2) = 300.0;
+  shrink(1, 2) = 200.0;
+  cv::Mat blurred;
+  cv::GaussianBlur(reference, blurred, cv::Size(), 1.2);  // what the smaller image cannot show
+  const cv::Mat current = warpedPicture(blurred, shrink, reference.size());
+
+  ViewMatcherParams params;
+  const ViewMatch smaller = matchImages(params, reference, current);
+  ASSERT_EQ(smaller.outcome, MatchOutcome::MATCHED) << smaller.message;
+  EXPECT_GT(smaller.reference_level, smaller.current_level);
+  EXPECT_LT(cornerError(smaller.matrix, shrink, reference.size()), 2.0);
+
+  const ViewMatch larger = matchImages(params, current, reference);
+  ASSERT_EQ(larger.outcome, MatchOutcome::MATCHED) << larger.message;
+  EXPECT_LT(larger.reference_level, larger.current_level);
+  EXPECT_LT(cornerError(larger.matrix.inverse(), shrink, reference.size()), 2.0);
+
+  params.scale_search = false;
+  EXPECT_EQ(matchImages(params, reference, current).outcome, MatchOutcome::NO_GEOMETRY);
+}
+
+TEST(ViewMatcher, FindsNothingInUnrelatedPictures)
+{
+  for (const GeometryModel model : { GeometryModel::HOMOGRAPHY, GeometryModel::FUNDAMENTAL })
+  {
+    for (int seed = 0; seed < 4; ++seed)
+    {
+      const ViewMatch match = matchImages(ViewMatcherParams(), texturedPicture(100 + seed),
+                                          texturedPicture(200 + seed), model);
+      EXPECT_EQ(match.outcome, MatchOutcome::NO_GEOMETRY) << "seed " << seed << ": " << match.message;
+      EXPECT_EQ(match.inliers, 0);
+      EXPECT_TRUE(match.matrix.array().isNaN().all());
+      EXPECT_TRUE(std::isnan(match.rms_error));
+      for (const MatchedPoint& point : match.matches)
+      {
+        EXPECT_FALSE(point.inlier);
+      }
+    }
+  }
+}
+
+TEST(ViewMatcher, FindsNothingInAMirroredPicture)
+{
+  for (const GeometryModel model : { GeometryModel::HOMOGRAPHY, GeometryModel::FUNDAMENTAL })
+  {
+    for (int seed = 0; seed < 2; ++seed)
+    {
+      const cv::Mat reference = texturedPicture(300 + seed);
+      cv::Mat mirrored;
+      cv::flip(reference, mirrored, 1);
+      const ViewMatch match = matchImages(ViewMatcherParams(), reference, mirrored, model);
+      EXPECT_EQ(match.outcome, MatchOutcome::NO_GEOMETRY) << "seed " << seed << ": " << match.message;
+    }
+  }
+}
+
+TEST(ViewMatcher, SaysWhenThereIsNothingToMatch)
+{
+  const cv::Mat flat(SIZE, CV_8UC1, cv::Scalar(90));
+  for (const GeometryModel model : { GeometryModel::HOMOGRAPHY, GeometryModel::FUNDAMENTAL })
+  {
+    const ViewMatch match = matchImages(ViewMatcherParams(), texturedPicture(1), flat, model);
+    EXPECT_EQ(match.outcome, MatchOutcome::TOO_FEW_FEATURES);
+    EXPECT_NE(match.message.find("0 in the current image"), std::string::npos) << match.message;
+    EXPECT_TRUE(match.matches.empty());
+  }
+}
+
+TEST(ViewMatcher, TakesImagesOfDifferentSizes)
+{
+  const cv::Mat reference = texturedPicture(5);
+  const cv::Size wide(620, 300);
+  const ViewMatch match =
+      matchImages(ViewMatcherParams(), reference, warpedPicture(reference, exampleHomography(), wide));
+  ASSERT_EQ(match.outcome, MatchOutcome::MATCHED);
+  EXPECT_LT(cornerError(match.matrix, exampleHomography(), SIZE), 0.5);
+}
+
+TEST(ViewMatcher, LooksOnlyInTheRegionOfInterest)
+{
+  const cv::Mat reference = texturedPicture(6);
+  const cv::Rect region(120, 60, 260, 240);
+  const ViewMatch match =
+      matchImages(ViewMatcherParams(), reference, warpedPicture(reference, exampleHomography(), SIZE),
+                  GeometryModel::HOMOGRAPHY, region);
+  ASSERT_EQ(match.outcome, MatchOutcome::MATCHED);
+  for (const MatchedPoint& point : match.matches)
+  {
+    EXPECT_TRUE(region.contains(cv::Point2d(point.position.reference.x(), point.position.reference.y())));
+  }
+}
+
+TEST(ViewMatcher, GivesTheSameResultEveryTime)
+{
+  const cv::Mat reference = texturedPicture(7);
+  const cv::Mat current = disturbed(warpedPicture(reference, exampleHomography(), SIZE), 0.9, 5.0, 3.0);
+  const int threads = cv::getNumThreads();
+  cv::setNumThreads(1);
+  const ViewMatch one = matchImages(ViewMatcherParams(), reference, current);
+  cv::setNumThreads(3);
+  const ViewMatch three = matchImages(ViewMatcherParams(), reference, current);
+  cv::setNumThreads(threads);
+  EXPECT_EQ(one.matrix, three.matrix);
+  ASSERT_EQ(one.matches.size(), three.matches.size());
+  for (std::size_t i = 0; i < one.matches.size(); ++i)
+  {
+    EXPECT_EQ(one.matches[i].position.current, three.matches[i].position.current);
+  }
+}
+
+TEST(ViewMatcher, TakesTheThresholdOfTheCall)
+{
+  const cv::Mat reference = texturedPicture(8);
+  const cv::Mat current = disturbed(warpedPicture(reference, exampleHomography(), SIZE), 1.0, 0.0, 3.0);
+  const ViewMatcher matcher{ ViewMatcherParams() };
+  const PreparedImage a(reference, cv::Rect(), matcher.params().points);
+  const PreparedImage b(current, cv::Rect(), matcher.params().points);
+  const ViewMatch tight = matcher.match(a, b, GeometryModel::HOMOGRAPHY, 0.5);
+  const ViewMatch wide = matcher.match(a, b, GeometryModel::HOMOGRAPHY, 4.0);
+  ASSERT_EQ(tight.outcome, MatchOutcome::MATCHED);
+  EXPECT_LT(tight.rms_error, 0.5);
+  EXPECT_LT(tight.inliers, wide.inliers);
+  EXPECT_THROW(matcher.match(a, b, GeometryModel::HOMOGRAPHY, -1.0), std::invalid_argument);
+  EXPECT_THROW(matcher.match(a, b, GeometryModel::HOMOGRAPHY, std::numeric_limits<double>::quiet_NaN()),
+               std::invalid_argument);
+}
+
+TEST(ViewMatcherParams, NameTheFaultsOfAllPartsAtOnce)
+{
+  EXPECT_TRUE(ViewMatcherParams().validate().empty());
+  ViewMatcherParams params;
+  params.points.corners.max_corners = 0;
+  params.ransac.max_iterations = 0;
+  params.consistency.threshold = 0.0;
+  params.guidance.patch_radius = 0;
+  params.min_log_significance = -1.0;
+  EXPECT_EQ(params.validate().size(), 5U);
+  EXPECT_THROW(ViewMatcher{ params }, std::invalid_argument);
+}
+
+}  // namespace
