@@ -6,7 +6,9 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <stdexcept>
+#include <utility>
 
 namespace view_servo
 {
@@ -148,41 +150,39 @@ void requireGrey(const cv::Mat& image)
 std::vector<ProfileSet::Pair> selectPairs(const std::vector<Corner>& corners, const ProfileParams& params)
 {
   const std::size_t n = corners.size();
-  std::vector<char> chosen(n * n, 0);
-  std::vector<std::pair<double, std::size_t>> near;
   const double min_squared = params.min_length * params.min_length;
   const double max_squared = params.selection == PairSelection::RADIUS ? params.max_length * params.max_length :
                                                                          std::numeric_limits<double>::infinity();
-  for (std::size_t i = 0; i < n; ++i)
-  {
-    near.clear();
-    for (std::size_t j = 0; j < n; ++j)
+  const std::size_t limit =
+      params.selection == PairSelection::NEAREST ? static_cast<std::size_t>(params.neighbours) : n;
+  std::vector<char> chosen(n * n, 0);  // row i: the corners that i is paired with
+  cv::parallel_for_(cv::Range(0, static_cast<int>(n)), [&](const cv::Range& range) {
+    std::vector<std::pair<double, std::size_t>> near;
+    for (std::size_t i = static_cast<std::size_t>(range.start); i < static_cast<std::size_t>(range.end); ++i)
     {
-      const double squared = (corners[j].position - corners[i].position).squaredNorm();
-      if (squared >= min_squared && squared <= max_squared)
+      near.clear();
+      for (std::size_t j = 0; j < n; ++j)
       {
-        near.emplace_back(squared, j);
+        const double squared = (corners[j].position - corners[i].position).squaredNorm();
+        if (squared >= min_squared && squared <= max_squared)
+        {
+          near.emplace_back(squared, j);
+        }
+      }
+      const std::size_t wanted = std::min(near.size(), limit);
+      std::nth_element(near.begin(), near.begin() + static_cast<std::ptrdiff_t>(wanted), near.end());
+      for (std::size_t k = 0; k < wanted; ++k)
+      {
+        chosen[i * n + near[k].second] = 1;
       }
     }
-    const std::size_t wanted = params.selection == PairSelection::NEAREST ?
-                                   std::min(near.size(), static_cast<std::size_t>(params.neighbours)) :
-                                   near.size();
-    if (wanted < near.size())
-    {
-      std::nth_element(near.begin(), near.begin() + static_cast<std::ptrdiff_t>(wanted), near.end());
-    }
-    for (std::size_t k = 0; k < wanted; ++k)
-    {
-      const std::size_t j = near[k].second;
-      chosen[std::min(i, j) * n + std::max(i, j)] = 1;
-    }
-  }
+  });
   std::vector<ProfileSet::Pair> pairs;
   for (std::size_t i = 0; i < n; ++i)
   {
     for (std::size_t j = i + 1; j < n; ++j)
     {
-      if (chosen[i * n + j] != 0)
+      if (chosen[i * n + j] != 0 || chosen[j * n + i] != 0)
       {
         pairs.push_back({ static_cast<int>(i), static_cast<int>(j) });
       }

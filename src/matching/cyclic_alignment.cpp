@@ -18,10 +18,16 @@ float CyclicAligner::align(const float* weights, int rows, int columns)
   {
     return 0.0F;
   }
-  weights_ = weights;
   rows_ = rows;
   columns_ = columns;
   best_ = 0.0F;
+  weights_.clear();
+  for (int row = 0; row < rows; ++row)
+  {
+    const float* first = weights + static_cast<std::size_t>(row) * static_cast<std::size_t>(columns);
+    weights_.insert(weights_.end(), first, first + columns);
+    weights_.insert(weights_.end(), first, first + columns);
+  }
   table_.resize(static_cast<std::size_t>(rows + 1) * static_cast<std::size_t>(2 * columns + 1));
   std::size_t levels = 3;
   for (int n = columns; n > 1; n = (n + 1) / 2)
@@ -30,7 +36,7 @@ float CyclicAligner::align(const float* weights, int rows, int columns)
   }
   paths_.resize(std::max(paths_.size(), levels));
 
-  // The columns are written twice side by side; rotation k runs from (0, k) to (rows, k + columns). Rotation `columns`
+  // The columns stand twice side by side; rotation k runs from (0, k) to (rows, k + columns). Rotation `columns`
   // is rotation 0 again, moved by one period.
   alignRotation(0, nullptr, nullptr, paths_[0]);
   paths_[1] = paths_[0];
@@ -71,31 +77,28 @@ void CyclicAligner::alignRotation(int rotation, const Path* left, const Path* ri
 
   // Cell (i, j): best weight of the first i rows against columns rotation .. j - 1; each row only within its band.
   std::fill(table_.begin() + low(0), table_.begin() + high(0) + 1, 0.0F);
-  int previous_low = low(0);
-  int previous_high = high(0);
   for (int i = 1; i <= rows_; ++i)
   {
-    const float* above = table_.data() + static_cast<std::size_t>(i - 1) * stride;
+    float* above = table_.data() + static_cast<std::size_t>(i - 1) * stride;
     float* here = table_.data() + static_cast<std::size_t>(i) * stride;
-    const float* weight = weights_ + static_cast<std::size_t>(i - 1) * static_cast<std::size_t>(columns_);
+    const float* weight = weights_.data() + static_cast<std::size_t>(i - 1) * (stride - 1);
     const int first = low(i);
     const int last = high(i);
-    float running = UNREACHABLE;
-    for (int j = first; j <= last; ++j)
+    // Bands only move to the right, so this row reads beyond the band above by one cell to the left, some to the right.
+    if (first > 0 && low(i - 1) == first)
     {
-      if (j >= previous_low && j <= previous_high)
-      {
-        running = std::max(running, above[j]);
-      }
-      if (j - 1 >= previous_low && j - 1 <= previous_high)
-      {
-        const int column = j - 1 < columns_ ? j - 1 : j - 1 - columns_;
-        running = std::max(running, above[j - 1] + weight[column]);
-      }
-      here[j] = running;
+      above[first - 1] = UNREACHABLE;
     }
-    previous_low = first;
-    previous_high = last;
+    std::fill(above + high(i - 1) + 1, above + last + 1, UNREACHABLE);
+    here[first] = first > 0 ? std::max(above[first], above[first - 1] + weight[first - 1]) : above[first];
+    for (int j = first + 1; j <= last; ++j)
+    {
+      here[j] = std::max(above[j], above[j - 1] + weight[j - 1]);
+    }
+    for (int j = first + 1; j <= last; ++j)
+    {
+      here[j] = std::max(here[j], here[j - 1]);
+    }
   }
 
   // Back from the end; among equal ways any is optimal.

@@ -24,7 +24,7 @@ namespace
 {
 constexpr double NOT_A_NUMBER = std::numeric_limits<double>::quiet_NaN();
 constexpr std::size_t MIN_CORNERS = 8;
-constexpr int GUIDED_ROUNDS = 2;
+constexpr int MAX_GUIDED_ROUNDS = 6;
 constexpr double HUBER_WIDTH = 0.5;  // of the final fits: residuals beyond count linearly [px]
 
 /** Which levels of reference and current image are compared, in the order of trial. */
@@ -297,7 +297,7 @@ public:
   /** More matches along the geometry that was found, and a better geometry from them. */
   void guide()
   {
-    for (int round = 0; round < GUIDED_ROUNDS; ++round)
+    for (int round = 0; round < MAX_GUIDED_ROUNDS; ++round)
     {
       const std::vector<Match> found = geometry_.isHomography() ? alongHomography() : alongFundamental();
       Correspondences supporting;
@@ -314,8 +314,13 @@ public:
           agreeing.push_back(match);
         }
       }
+      const bool grown = agreeing.size() > inliers_.size() + inliers_.size() / 50;
       matrix_ = refined;
       inliers_ = std::move(agreeing);
+      if (round > 0 && !grown)
+      {
+        break;
+      }
     }
   }
 

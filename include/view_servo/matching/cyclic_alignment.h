@@ -37,10 +37,10 @@ private:
   void alignRotation(int rotation, const Path* left, const Path* right, Path& path);
   void divide(int left_rotation, int right_rotation, std::size_t left, std::size_t right);
 
-  const float* weights_ = nullptr;
   int rows_ = 0;
   int columns_ = 0;
   float best_ = 0.0F;
+  std::vector<float> weights_;  // rows_ x 2 columns_: each row of the caller's twice
   std::vector<float> table_;  // (rows_ + 1) x (2 columns_ + 1)
   std::vector<Path> paths_;   // a stack: two for the ends, one a level of division
   std::size_t stack_size_ = 0;
