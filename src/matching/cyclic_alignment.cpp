@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <limits>
+#include <numeric>
 
 namespace view_servo
 {
@@ -20,14 +21,20 @@ float CyclicAligner::align(const float* weights, int rows, int columns)
   }
   rows_ = rows;
   columns_ = columns;
-  best_ = 0.0F;
   weights_.clear();
+  gains_.assign(static_cast<std::size_t>(columns) + 1, 0.0F);
   for (int row = 0; row < rows; ++row)
   {
     const float* first = weights + static_cast<std::size_t>(row) * static_cast<std::size_t>(columns);
     weights_.insert(weights_.end(), first, first + columns);
     weights_.insert(weights_.end(), first, first + columns);
+    for (int column = 0; column < columns; ++column)
+    {
+      float& gain = gains_[static_cast<std::size_t>(column) + 1];
+      gain = std::max(gain, first[column]);
+    }
   }
+  std::partial_sum(gains_.begin(), gains_.end(), gains_.begin());
   table_.resize(static_cast<std::size_t>(rows + 1) * static_cast<std::size_t>(2 * columns + 1));
   std::size_t levels = 3;
   for (int n = columns; n > 1; n = (n + 1) / 2)
@@ -38,7 +45,7 @@ float CyclicAligner::align(const float* weights, int rows, int columns)
 
   // The columns stand twice side by side; rotation k runs from (0, k) to (rows, k + columns). Rotation `columns`
   // is rotation 0 again, moved by one period.
-  alignRotation(0, nullptr, nullptr, paths_[0]);
+  best_ = alignRotation(0, nullptr, nullptr, paths_[0]);
   paths_[1] = paths_[0];
   for (std::size_t row = 0; row <= static_cast<std::size_t>(rows); ++row)
   {
@@ -46,25 +53,38 @@ float CyclicAligner::align(const float* weights, int rows, int columns)
     paths_[1].last[row] += columns;
   }
   stack_size_ = 2;
-  divide(0, columns, 0, 1);
+  divide({ 0, best_, 0 }, { columns, best_, 1 });
   return best_;
 }
 
-void CyclicAligner::divide(int left_rotation, int right_rotation, std::size_t left, std::size_t right)
+void CyclicAligner::divide(const Rotation& left, const Rotation& right)
 {
-  const int middle_rotation = (left_rotation + right_rotation) / 2;
-  if (middle_rotation == left_rotation)
+  // Any rotation between weighs at most left + (what comes after left) and right + (what comes before right).
+  const float between =
+      gains_[static_cast<std::size_t>(right.columns)] - gains_[static_cast<std::size_t>(left.columns)];
+  Rotation middle{ (left.columns + right.columns) / 2, 0.0F, stack_size_ };
+  if (middle.columns == left.columns || 0.5F * (left.weight + right.weight + between) <= best_)
   {
     return;
   }
-  const std::size_t middle = stack_size_++;
-  alignRotation(middle_rotation, &paths_[left], &paths_[right], paths_[middle]);
-  divide(left_rotation, middle_rotation, left, middle);
-  divide(middle_rotation, right_rotation, middle, right);
+  ++stack_size_;
+  middle.weight = alignRotation(middle.columns, &paths_[left.path], &paths_[right.path], paths_[middle.path]);
+  best_ = std::max(best_, middle.weight);
+  // The better side first: what it finds may spare the other.
+  if (left.weight >= right.weight)
+  {
+    divide(left, middle);
+    divide(middle, right);
+  }
+  else
+  {
+    divide(middle, right);
+    divide(left, middle);
+  }
   --stack_size_;
 }
 
-void CyclicAligner::alignRotation(int rotation, const Path* left, const Path* right, Path& path)
+float CyclicAligner::alignRotation(int rotation, const Path* left, const Path* right, Path& path)
 {
   const std::size_t stride = static_cast<std::size_t>(2 * columns_ + 1);
   const auto low = [&](int row) {
@@ -81,7 +101,7 @@ void CyclicAligner::alignRotation(int rotation, const Path* left, const Path* ri
   {
     float* above = table_.data() + static_cast<std::size_t>(i - 1) * stride;
     float* here = table_.data() + static_cast<std::size_t>(i) * stride;
-    const float* weight = weights_.data() + static_cast<std::size_t>(i - 1) * (stride - 1);
+    const float* row_weights = weights_.data() + static_cast<std::size_t>(i - 1) * (stride - 1);
     const int first = low(i);
     const int last = high(i);
     // Bands only move to the right, so this row reads beyond the band above by one cell to the left, some to the right.
@@ -90,10 +110,10 @@ void CyclicAligner::alignRotation(int rotation, const Path* left, const Path* ri
       above[first - 1] = UNREACHABLE;
     }
     std::fill(above + high(i - 1) + 1, above + last + 1, UNREACHABLE);
-    here[first] = first > 0 ? std::max(above[first], above[first - 1] + weight[first - 1]) : above[first];
+    here[first] = first > 0 ? std::max(above[first], above[first - 1] + row_weights[first - 1]) : above[first];
     for (int j = first + 1; j <= last; ++j)
     {
-      here[j] = std::max(above[j], above[j - 1] + weight[j - 1]);
+      here[j] = std::max(above[j], above[j - 1] + row_weights[j - 1]);
     }
     for (int j = first + 1; j <= last; ++j)
     {
@@ -105,7 +125,7 @@ void CyclicAligner::alignRotation(int rotation, const Path* left, const Path* ri
   path.first.resize(static_cast<std::size_t>(rows_) + 1);
   path.last.resize(static_cast<std::size_t>(rows_) + 1);
   int j = rotation + columns_;
-  best_ = std::max(best_, table_[static_cast<std::size_t>(rows_) * stride + static_cast<std::size_t>(j)]);
+  const float weight = table_[static_cast<std::size_t>(rows_) * stride + static_cast<std::size_t>(j)];
   for (int i = rows_; i > 0; --i)
   {
     const float* above = table_.data() + static_cast<std::size_t>(i - 1) * stride;
@@ -124,6 +144,7 @@ void CyclicAligner::alignRotation(int rotation, const Path* left, const Path* ri
   }
   path.last[0] = j;
   path.first[0] = rotation;
+  return weight;
 }
 
 }  // namespace view_servo

@@ -9,7 +9,6 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
-#include <functional>
 #include <numeric>
 #include <utility>
 
@@ -66,35 +65,131 @@ std::uint32_t directionKey(const std::vector<Corner>& corners, int corner, int n
   return steps << 16U | static_cast<std::uint32_t>(neighbour);
 }
 
-/** Marks, in a rows x columns matrix, the `count` largest positive entries of each row and of each column. */
+/** Marks, in a rows x columns matrix, the `count` largest positive entries of each row and of each column; 0 = all. */
 std::vector<char> strongestEntries(const std::vector<float>& matrix, std::size_t rows, std::size_t columns, int count)
 {
   std::vector<char> chosen(matrix.size(), 0);
-  std::vector<std::pair<float, std::size_t>> line;
+  // One pass over the rows, one over the columns; within a pass the lines share no entry.
   const auto mark = [&](std::size_t lines, std::size_t length, std::size_t line_stride, std::size_t stride) {
-    for (std::size_t l = 0; l < lines; ++l)
-    {
-      line.clear();
-      for (std::size_t k = 0; k < length; ++k)
+    cv::parallel_for_(cv::Range(0, static_cast<int>(lines)), [&](const cv::Range& range) {
+      std::vector<std::pair<float, std::size_t>> line;
+      for (std::size_t l = static_cast<std::size_t>(range.start); l < static_cast<std::size_t>(range.end); ++l)
       {
-        const std::size_t place = l * line_stride + k * stride;
-        if (matrix[place] > 0.0F)
+        line.clear();
+        for (std::size_t k = 0; k < length; ++k)
         {
-          line.emplace_back(-matrix[place], place);
+          const std::size_t place = l * line_stride + k * stride;
+          if (matrix[place] > 0.0F)
+          {
+            line.emplace_back(-matrix[place], place);
+          }
+        }
+        const std::size_t wanted =
+            count > 0 ? std::min(line.size(), static_cast<std::size_t>(count)) : line.size();
+        std::partial_sort(line.begin(), line.begin() + static_cast<std::ptrdiff_t>(wanted), line.end());
+        for (std::size_t k = 0; k < wanted; ++k)
+        {
+          chosen[line[k].second] = 1;
         }
       }
-      const std::size_t wanted =
-          count > 0 ? std::min(line.size(), static_cast<std::size_t>(count)) : line.size();
-      std::partial_sort(line.begin(), line.begin() + static_cast<std::ptrdiff_t>(wanted), line.end());
-      for (std::size_t k = 0; k < wanted; ++k)
-      {
-        chosen[line[k].second] = 1;
-      }
-    }
+    });
   };
   mark(rows, columns, columns, 1);
   mark(columns, rows, 1, columns);
   return chosen;
+}
+
+/** For each current profile, the reference profiles similar to it. */
+using SimilarProfiles = std::vector<std::vector<ProfileMatch>>;
+
+/** The association by votes alone (eq. 7.3), rows x columns. */
+std::vector<float> countVotes(const PointFeatures& reference, const PointFeatures& current,
+                              const SimilarProfiles& similar)
+{
+  const std::size_t columns = current.corners.size();
+  std::vector<float> votes(reference.corners.size() * columns, 0.0F);
+  for (std::size_t p = 0; p < similar.size(); ++p)
+  {
+    const float vote = similar[p].empty() ? 0.0F : 1.0F / static_cast<float>(similar[p].size());
+    for (const ProfileMatch& match : similar[p])
+    {
+      visitEnds(reference.profiles.pairs[static_cast<std::size_t>(match.reference)], current.profiles.pairs[p],
+                match.reversed, [&](int row, int column, int, int) {
+                  votes[static_cast<std::size_t>(row) * columns + static_cast<std::size_t>(column)] += vote;
+                });
+    }
+  }
+  return votes;
+}
+
+/** Votes ordered by their entry: those of entry e are votes[begin[e]] .. votes[begin[e + 1]]. */
+struct GroupedVotes
+{
+  std::vector<Vote> votes;
+  std::vector<std::size_t> begin;
+};
+
+/** Who voted for each of `count` entries; entry_of gives an entry's number, or -1, for each place of the matrix. */
+GroupedVotes groupVotes(const PointFeatures& reference, const PointFeatures& current, const SimilarProfiles& similar,
+                        const std::vector<int>& entry_of, std::size_t count, const PointMatcherParams& params)
+{
+  // Parts of the profiles are gone through side by side and joined in their order: the result is that of one pass.
+  constexpr std::size_t PARTS = 8;
+  std::vector<std::vector<std::pair<std::size_t, Vote>>> parts(PARTS);
+  cv::parallel_for_(cv::Range(0, static_cast<int>(PARTS)), [&](const cv::Range& range) {
+    for (std::size_t part = static_cast<std::size_t>(range.start); part < static_cast<std::size_t>(range.end); ++part)
+    {
+      for (std::size_t p = similar.size() * part / PARTS; p < similar.size() * (part + 1) / PARTS; ++p)
+      {
+        for (const ProfileMatch& match : similar[p])
+        {
+          const std::size_t r = static_cast<std::size_t>(match.reference);
+          float weight = -1.0F;  // not yet computed
+          visitEnds(reference.profiles.pairs[r], current.profiles.pairs[p], match.reversed,
+                    [&](int row, int column, int row_neighbour, int column_neighbour) {
+                      const int entry = entry_of[static_cast<std::size_t>(row) * current.corners.size() +
+                                                 static_cast<std::size_t>(column)];
+                      if (entry < 0)
+                      {
+                        return;
+                      }
+                      if (weight < 0.0F)
+                      {
+                        weight = std::max(0.0F, correlation(reference.profiles.feature(r), current.profiles.feature(p),
+                                                            current.profiles.coefficients, match.reversed));
+                      }
+                      if (weight > 0.0F && static_cast<double>(weight) >= params.min_correlation)
+                      {
+                        parts[part].push_back({ static_cast<std::size_t>(entry),
+                                                { directionKey(reference.corners, row, row_neighbour),
+                                                  directionKey(current.corners, column, column_neighbour), weight } });
+                      }
+                    });
+        }
+      }
+    }
+  });
+
+  GroupedVotes grouped;
+  grouped.begin.assign(count + 1, 0);
+  for (const auto& part : parts)
+  {
+    for (const auto& [entry, vote] : part)
+    {
+      ++grouped.begin[entry + 1];
+    }
+  }
+  std::partial_sum(grouped.begin.begin(), grouped.begin.end(), grouped.begin.begin());
+  grouped.votes.resize(grouped.begin.back());
+  std::vector<std::size_t> next(grouped.begin.begin(), grouped.begin.end() - 1);
+  for (const auto& part : parts)
+  {
+    for (const auto& [entry, vote] : part)
+    {
+      grouped.votes[next[entry]++] = vote;
+    }
+  }
+  return grouped;
 }
 
 /** Eq. 7.4 for one entry: the votes as a matrix between the profiles in angular order, aligned cyclically. */
@@ -174,96 +269,33 @@ AssociationMatrix associatePoints(const PointFeatures& reference, const ProfileI
 {
   const std::size_t rows = reference.corners.size();
   const std::size_t columns = current.corners.size();
-  const std::vector<std::vector<ProfileMatch>> similar = index.search(current.profiles, params.search);
+  const SimilarProfiles similar = index.search(current.profiles, params.search);
+  const std::vector<float> votes = countVotes(reference, current, similar);
 
-  std::vector<float> votes(rows * columns, 0.0F);
-  for (std::size_t p = 0; p < similar.size(); ++p)
-  {
-    const float vote = similar[p].empty() ? 0.0F : 1.0F / static_cast<float>(similar[p].size());
-    for (const ProfileMatch& match : similar[p])
-    {
-      visitEnds(reference.profiles.pairs[static_cast<std::size_t>(match.reference)], current.profiles.pairs[p],
-                match.reversed, [&](int row, int column, int, int) {
-                  votes[static_cast<std::size_t>(row) * columns + static_cast<std::size_t>(column)] += vote;
-                });
-    }
-  }
-
+  const std::vector<char> chosen =
+      params.cyclic_order ? strongestEntries(votes, rows, columns, params.cyclic_entries) : std::vector<char>();
   std::vector<Association> entries;
-  if (!params.cyclic_order)
-  {
-    for (std::size_t k = 0; k < votes.size(); ++k)
-    {
-      if (votes[k] > 0.0F)
-      {
-        entries.push_back(
-            { static_cast<int>(k / columns), static_cast<int>(k % columns), static_cast<double>(votes[k]) });
-      }
-    }
-    return AssociationMatrix(static_cast<int>(rows), static_cast<int>(columns), std::move(entries));
-  }
-
-  // Who voted for the entries that can still win, entry by entry.
-  const std::vector<char> chosen = strongestEntries(votes, rows, columns, params.cyclic_entries);
   std::vector<int> entry_of(votes.size(), -1);
-  for (std::size_t k = 0; k < chosen.size(); ++k)
+  for (std::size_t k = 0; k < votes.size(); ++k)
   {
-    if (chosen[k] != 0)
+    if (params.cyclic_order ? chosen[k] != 0 : votes[k] > 0.0F)
     {
       entry_of[k] = static_cast<int>(entries.size());
-      entries.push_back({ static_cast<int>(k / columns), static_cast<int>(k % columns), 0.0 });
+      entries.push_back({ static_cast<int>(k / columns), static_cast<int>(k % columns), static_cast<double>(votes[k]) });
     }
   }
-  std::vector<std::pair<int, Vote>> cast;
-  for (std::size_t p = 0; p < similar.size(); ++p)
+  if (params.cyclic_order)
   {
-    for (const ProfileMatch& match : similar[p])
-    {
-      float weight = -1.0F;
-      visitEnds(reference.profiles.pairs[static_cast<std::size_t>(match.reference)], current.profiles.pairs[p],
-                match.reversed, [&](int row, int column, int row_neighbour, int column_neighbour) {
-                  const int entry =
-                      entry_of[static_cast<std::size_t>(row) * columns + static_cast<std::size_t>(column)];
-                  if (entry < 0)
-                  {
-                    return;
-                  }
-                  if (weight < 0.0F)
-                  {
-                    weight = correlation(reference.profiles.feature(static_cast<std::size_t>(match.reference)),
-                                         current.profiles.feature(p), current.profiles.coefficients, match.reversed);
-                    weight = static_cast<double>(weight) >= params.min_correlation ? weight : 0.0F;
-                  }
-                  if (weight > 0.0F)
-                  {
-                    cast.push_back({ entry, { directionKey(reference.corners, row, row_neighbour),
-                                              directionKey(current.corners, column, column_neighbour), weight } });
-                  }
-                });
-    }
+    const GroupedVotes grouped = groupVotes(reference, current, similar, entry_of, entries.size(), params);
+    cv::parallel_for_(cv::Range(0, static_cast<int>(entries.size())), [&](const cv::Range& range) {
+      EntryAligner aligner;
+      for (std::size_t e = static_cast<std::size_t>(range.start); e < static_cast<std::size_t>(range.end); ++e)
+      {
+        entries[e].weight = static_cast<double>(
+            aligner.align(grouped.votes.data() + grouped.begin[e], grouped.votes.data() + grouped.begin[e + 1]));
+      }
+    });
   }
-  std::vector<std::size_t> begin(entries.size() + 1, 0);
-  for (const auto& [entry, vote] : cast)
-  {
-    ++begin[static_cast<std::size_t>(entry) + 1];
-  }
-  std::partial_sum(begin.begin(), begin.end(), begin.begin());
-  std::vector<Vote> sorted(cast.size());
-  std::vector<std::size_t> next(begin.begin(), begin.end() - 1);
-  for (const auto& [entry, vote] : cast)
-  {
-    sorted[next[static_cast<std::size_t>(entry)]++] = vote;
-  }
-
-  cv::parallel_for_(cv::Range(0, static_cast<int>(entries.size())), [&](const cv::Range& range) {
-    EntryAligner aligner;
-    for (int e = range.start; e < range.end; ++e)
-    {
-      const std::size_t k = static_cast<std::size_t>(e);
-      entries[k].weight =
-          static_cast<double>(aligner.align(sorted.data() + begin[k], sorted.data() + begin[k + 1]));
-    }
-  });
   return AssociationMatrix(static_cast<int>(rows), static_cast<int>(columns), std::move(entries));
 }
 

@@ -13,6 +13,8 @@ namespace view_servo
  * Weighted longest common subsequence over all rotations of the second string, exact, by divide and conquer over the
  * rotations: an optimal path of a rotation can always be found between those of a smaller and a larger one, so each
  * is confined to the band between two found before (Maes 1990; Gregor & Thomason 1993). O(m n log n) for m x n weights.
+ * Moving one column from the front to the back gains its largest weight at most, so that rotations between two poor
+ * ones are left out where they cannot reach the best.
  *
  * An object keeps its work space between calls: one per thread.
  */
@@ -34,13 +36,22 @@ private:
     std::vector<int> last;
   };
 
-  void alignRotation(int rotation, const Path* left, const Path* right, Path& path);
-  void divide(int left_rotation, int right_rotation, std::size_t left, std::size_t right);
+  /** A rotation with its best weight, and where its path is kept. */
+  struct Rotation
+  {
+    int columns;
+    float weight;
+    std::size_t path;
+  };
+
+  float alignRotation(int rotation, const Path* left, const Path* right, Path& path);
+  void divide(const Rotation& left, const Rotation& right);
 
   int rows_ = 0;
   int columns_ = 0;
   float best_ = 0.0F;
   std::vector<float> weights_;  // rows_ x 2 columns_: each row of the caller's twice
+  std::vector<float> gains_;    // of the first k columns together: sums of their largest weights
   std::vector<float> table_;  // (rows_ + 1) x (2 columns_ + 1)
   std::vector<Path> paths_;   // a stack: two for the ends, one a level of division
   std::size_t stack_size_ = 0;
