@@ -337,52 +337,74 @@ Problem tiltedPlane(const std::string& name, const cv::Mat& texture, double tilt
 
 int tilt(const ViewMatcherParams& params)
 {
-  ViewMatcherParams voting_only = params;
-  voting_only.points.cyclic_order = false;
+  ViewMatcherParams cyclic = params;
+  cyclic.guided = false;
+  cyclic.points.cyclic_order = true;
+  ViewMatcherParams votes = cyclic;
+  votes.points.cyclic_order = false;
   const std::vector<std::pair<std::string, std::function<Answer(const Problem&)>>> pipelines = {
     { "view_servo", [&](const Problem& p) { return runOurs(params, p); } },
-    { "without cyclic order", [&](const Problem& p) { return runOurs(voting_only, p); } },
+    { "not guided", [&](const Problem& p) { return runOurs(cyclic, p); } },
+    { "nor cyclic order", [&](const Problem& p) { return runOurs(votes, p); } },
     { "SIFT 500", runSift },
     { "AKAZE", runAkaze },
   };
+  const std::vector<int> angles = { 0, 30, 45, 50, 55, 60, 65, 70, 75, 80 };
+  std::vector<std::vector<int>> solved(pipelines.size(), std::vector<int>(angles.size(), 0));
+  std::vector<std::vector<int>> sums(pipelines.size(), std::vector<int>(angles.size(), 0));
+  int problems = 0;
+  const auto header = [&](const std::string& title) {
+    std::printf("%s\n%-20s", title.c_str(), "  tilt");
+    for (const int angle : angles)
+    {
+      std::printf("%9d ", angle);
+    }
+    std::printf("\n");
+  };
   std::printf("correct candidates/correct inliers, * = corner error under 5 px\n");
-  int textures = 0;
-  for (const std::string name : { "graf1.png", "Klimt.ppm", "Solvay_conference_1927_Version2_1024x705.png", "starry_night.jpg",
-                                  "baboon.jpg", "board.jpg", "building.jpg" })
+  for (const std::string name : { "graf1.png", "Klimt.ppm", "Solvay_conference_1927_Version2_1024x705.png",
+                                  "starry_night.jpg", "baboon.jpg", "board.jpg", "building.jpg" })
   {
     const cv::Mat texture = loadTexture(name);
     if (texture.empty())
     {
       continue;
     }
-    ++textures;
-    for (int axis = 0; axis < 2; ++axis)
+    for (int axis = 0; axis < 2; ++axis, ++problems)
     {
-      std::printf("%s, %s axis\n%-22s", name.c_str(), axis == 0 ? "vertical" : "horizontal", "  tilt");
-      const std::vector<int> angles = { 0, 30, 45, 50, 55, 60, 65, 70, 75, 80 };
-      std::vector<Problem> problems;
-      for (const int angle : angles)
+      header(name + (axis == 0 ? ", vertical axis" : ", horizontal axis"));
+      for (std::size_t i = 0; i < pipelines.size(); ++i)
       {
-        std::printf("%9d ", angle);
-        problems.push_back(tiltedPlane(name, texture, angle, axis, static_cast<std::uint64_t>(angle) + 1));
-      }
-      std::printf("\n");
-      for (const auto& [pipeline, run] : pipelines)
-      {
-        std::printf("  %-20s", pipeline.c_str());
-        for (const Problem& problem : problems)
+        std::printf("  %-18s", pipelines[i].first.c_str());
+        for (std::size_t k = 0; k < angles.size(); ++k)
         {
-          const Answer answer = run(problem);
-          std::printf("%4d/%4d%c", correct(answer.candidates, problem.truth), correct(answer.inliers, problem.truth),
-                      cornerError(answer, problem) < 5.0 ? '*' : ' ');
+          const Problem problem =
+              tiltedPlane(name, texture, angles[k], axis, static_cast<std::uint64_t>(angles[k]) + 1);
+          const Answer answer = pipelines[i].second(problem);
+          const int candidates = correct(answer.candidates, problem.truth);
+          const bool good = cornerError(answer, problem) < 5.0;
+          solved[i][k] += good ? 1 : 0;
+          sums[i][k] += candidates;
+          std::printf("%4d/%4d%c", candidates, correct(answer.inliers, problem.truth), good ? '*' : ' ');
         }
         std::printf("\n");
       }
     }
   }
-  if (textures == 0)
+  if (problems == 0)
   {
     std::cout << "tilt: skipped, neither opencv-doc nor visp-images-data is installed\n";
+    return 0;
+  }
+  header("all: solved of " + std::to_string(problems) + ", mean correct candidates");
+  for (std::size_t i = 0; i < pipelines.size(); ++i)
+  {
+    std::printf("  %-18s", pipelines[i].first.c_str());
+    for (std::size_t k = 0; k < angles.size(); ++k)
+    {
+      std::printf("%4d/%4d ", solved[i][k], sums[i][k] / problems);
+    }
+    std::printf("\n");
   }
   return 0;
 }
@@ -410,7 +432,7 @@ int timing(const ViewMatcherParams& params, int runs)
   std::vector<double> stored_ms;
   std::vector<double> sift_ms;
   std::vector<double> akaze_ms;
-  std::vector<StageTime> stages;
+  std::vector<std::vector<StageTime>> stages;
   for (int run = 0; run < runs + 1; ++run)
   {
     const double ours = runOurs(params, problem).ms;
@@ -426,7 +448,7 @@ int timing(const ViewMatcherParams& params, int runs)
       stored_ms.push_back(against_stored);
       sift_ms.push_back(sift);
       akaze_ms.push_back(akaze);
-      stages = match.stages;
+      stages.push_back(match.stages);
     }
   }
   const double sift = median(sift_ms);
@@ -434,9 +456,14 @@ int timing(const ViewMatcherParams& params, int runs)
   std::printf("AKAZE                 %7.1f  %.2f of SIFT\n", median(akaze_ms), median(akaze_ms) / sift);
   std::printf("both images fresh     %7.1f  %.2f of SIFT\n", median(fresh_ms), median(fresh_ms) / sift);
   std::printf("reference stored      %7.1f  %.2f of SIFT\n", median(stored_ms), median(stored_ms) / sift);
-  for (const StageTime& stage : stages)
+  for (std::size_t i = 0; i < stages.front().size(); ++i)
   {
-    std::printf("  %-20s%7.1f\n", stage.name.c_str(), stage.ms);
+    std::vector<double> ms;
+    for (const std::vector<StageTime>& run : stages)
+    {
+      ms.push_back(run[i].ms);
+    }
+    std::printf("  %-20s%7.1f\n", stages.front()[i].name.c_str(), median(ms));
   }
   return 0;
 }

@@ -61,8 +61,7 @@ std::vector<double> realRoots(double a, double b, double c)
     const double s = -std::copysign(std::cbrt(std::abs(r) + std::sqrt(std::max(r * r - q * q * q, 0.0))), r);
     roots.push_back(s + (s != 0.0 ? q / s : 0.0) - a / 3.0);
   }
-  const auto value = [=](double x)
-  {
+  const auto value = [=](double x) {
     return ((x + a) * x + b) * x + c;
   };
   for (double& x : roots)

@@ -138,17 +138,14 @@ bool isHomographySample(const Correspondences& four, double min_height)
   {
     return false;
   }
-  return std::all_of(std::begin(TRIANGLES), std::end(TRIANGLES),
-                     [&](const auto& triangle)
-                     {
-                       const Correspondence& a = four[triangle[0]];
-                       const Correspondence& b = four[triangle[1]];
-                       const Correspondence& c = four[triangle[2]];
-                       const double reference = signedHeight(a.reference, b.reference, c.reference);
-                       const double current = signedHeight(a.current, b.current, c.current);
-                       return std::abs(reference) >= min_height && std::abs(current) >= min_height &&
-                              reference * current > 0.0;
-                     });
+  return std::all_of(std::begin(TRIANGLES), std::end(TRIANGLES), [&](const auto& triangle) {
+    const Correspondence& a = four[triangle[0]];
+    const Correspondence& b = four[triangle[1]];
+    const Correspondence& c = four[triangle[2]];
+    const double reference = signedHeight(a.reference, b.reference, c.reference);
+    const double current = signedHeight(a.current, b.current, c.current);
+    return std::abs(reference) >= min_height && std::abs(current) >= min_height && reference * current > 0.0;
+  });
 }
 
 std::optional<Eigen::Matrix3d> homographyFromPoints(const Correspondences& pairs)
@@ -191,9 +188,9 @@ std::optional<Eigen::Matrix3d> homographyFromPoints(const Correspondences& pairs
     h = -h;
   }
   const Eigen::Matrix3d h_inverse = h.inverse();
-  const bool in_view = std::all_of(pairs.begin(), pairs.end(),
-                                   [&](const Correspondence& pair)
-                                   { return std::isfinite(symmetricTransferError(h, h_inverse, pair)); });
+  const bool in_view = std::all_of(pairs.begin(), pairs.end(), [&](const Correspondence& pair) {
+    return std::isfinite(symmetricTransferError(h, h_inverse, pair));
+  });
   return in_view ? std::make_optional(h) : std::nullopt;
 }
 
@@ -204,9 +201,9 @@ Eigen::Matrix3d refineHomography(const Eigen::Matrix3d& initial, const Correspon
   const Eigen::Matrix3d initial_inverse = initial.inverse();
   Correspondences usable;
   usable.reserve(pairs.size());
-  std::copy_if(pairs.begin(), pairs.end(), std::back_inserter(usable),
-               [&](const Correspondence& pair)
-               { return std::isfinite(symmetricTransferError(initial, initial_inverse, pair)); });
+  std::copy_if(pairs.begin(), pairs.end(), std::back_inserter(usable), [&](const Correspondence& pair) {
+    return std::isfinite(symmetricTransferError(initial, initial_inverse, pair));
+  });
   const auto normalization = commonNormalization(usable);
   if (usable.size() < 4 || !normalization)
   {

@@ -134,8 +134,7 @@ struct Orthonormal
   {
     const Eigen::DiagonalMatrix<double, 3> s(std::cos(p), std::sin(p), 0.0);
     Matrix9x7d d;
-    const auto set = [&d](int column, const Eigen::Matrix3d& m)
-    {
+    const auto set = [&d](int column, const Eigen::Matrix3d& m) {
       d.col(column) = rowMajor(m);
     };
     for (int k = 0; k < 3; ++k)

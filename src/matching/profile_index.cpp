@@ -8,6 +8,8 @@
 #include <nanoflann.hpp>
 
 #include <algorithm>
+#include <cmath>
+#include <cstdint>
 #include <stdexcept>
 #include <utility>
 
@@ -93,6 +95,24 @@ void reverse(const float* feature, std::size_t columns, float* reversed)
   }
 }
 
+/** Marks the given part of the profiles, those whose features have the largest norms. */
+std::vector<char> largest(const ProfileSet& profiles, double share)
+{
+  std::vector<std::pair<float, std::size_t>> norms;
+  for (std::size_t i = 0; i < profiles.pairs.size(); ++i)
+  {
+    norms.emplace_back(-Eigen::Map<const Eigen::VectorXf>(profiles.feature(i), profiles.coefficients).squaredNorm(), i);
+  }
+  const std::size_t count = static_cast<std::size_t>(std::ceil(share * static_cast<double>(norms.size())));
+  std::nth_element(norms.begin(), norms.begin() + static_cast<std::ptrdiff_t>(count), norms.end());
+  std::vector<char> marked(norms.size(), 0);
+  for (std::size_t k = 0; k < count; ++k)
+  {
+    marked[norms[k].second] = 1;
+  }
+  return marked;
+}
+
 }  // namespace
 
 std::vector<std::string> ProfileSearchParams::validate() const
@@ -109,6 +129,10 @@ std::vector<std::string> ProfileSearchParams::validate() const
   if (!(epsilon >= 0.0))
   {
     faults.emplace_back("search_epsilon must be at least 0");
+  }
+  if (!(share > 0.0 && share <= 1.0))
+  {
+    faults.emplace_back("search_share must lie in (0, 1]");
   }
   return faults;
 }
@@ -223,11 +247,16 @@ std::vector<std::vector<ProfileMatch>> ProfileIndex::search(const ProfileSet& cu
   {
     return matches;
   }
+  const std::vector<char> wanted = largest(current, params.share);
   cv::parallel_for_(cv::Range(0, static_cast<int>(current.pairs.size())), [&](const cv::Range& range) {
     std::vector<std::pair<std::uint32_t, float>> found;
     std::vector<float> reversed(cloud.columns);
     for (int i = range.start; i < range.end; ++i)
     {
+      if (wanted[static_cast<std::size_t>(i)] == 0)
+      {
+        continue;
+      }
       const float* query = current.feature(static_cast<std::size_t>(i));
       const bool turned = query[DIRECTING_FEATURE] < 0.0F;
       if (turned)

@@ -14,8 +14,7 @@ bool FundamentalEstimator::accepts(const std::vector<int>& sample) const
   {
     return true;
   }
-  const auto consistent = [&](std::size_t first)
-  {
+  const auto consistent = [&](std::size_t first) {
     std::array<Correspondence, 5> five;
     for (std::size_t i = 0; i < five.size(); ++i)
     {

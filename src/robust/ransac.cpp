@@ -25,8 +25,7 @@ std::size_t uniformIndex(Rng& rng, std::size_t count)
 std::vector<std::string> RansacParams::validate() const
 {
   std::vector<std::string> faults;
-  const auto require = [&faults](bool condition, const char* fault)
-  {
+  const auto require = [&faults](bool condition, const char* fault) {
     if (!condition)
     {
       faults.emplace_back(fault);

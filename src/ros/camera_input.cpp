@@ -52,18 +52,14 @@ CameraInput::CameraInput(const ros::NodeHandle& nh, const CameraInputParams& par
   ros::NodeHandle topics_nh(nh);
   synchronizer_.connectInput(image_subscriber_, info_subscriber_);
   synchronizer_.registerCallback(&CameraInput::frameCallback, this);
-  image_subscriber_.registerCallback(
-      [this](const sensor_msgs::ImageConstPtr&)
-      {
-        const std::lock_guard<std::mutex> lock(mutex_);
-        ++images_;
-      });
-  info_subscriber_.registerCallback(
-      [this](const sensor_msgs::CameraInfoConstPtr&)
-      {
-        const std::lock_guard<std::mutex> lock(mutex_);
-        ++infos_;
-      });
+  image_subscriber_.registerCallback([this](const sensor_msgs::ImageConstPtr&) {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    ++images_;
+  });
+  info_subscriber_.registerCallback([this](const sensor_msgs::CameraInfoConstPtr&) {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    ++infos_;
+  });
   image_subscriber_.subscribe(transport_, "image_raw", queue_size, image_transport::TransportHints());
   info_subscriber_.subscribe(topics_nh, "camera_info", queue_size);
   check_timer_ =

@@ -170,18 +170,16 @@ geometry_msgs::PoseStamped toPoseStamped(const ViewPose& pose, const ros::Time& 
 std::vector<PointMatch> toPointMatches(const std::vector<MatchedPoint>& matches)
 {
   std::vector<PointMatch> messages(matches.size());
-  std::transform(matches.begin(), matches.end(), messages.begin(),
-                 [](const MatchedPoint& match)
-                 {
-                   PointMatch message;
-                   message.reference_x = match.position.reference.x();
-                   message.reference_y = match.position.reference.y();
-                   message.current_x = match.position.current.x();
-                   message.current_y = match.position.current.y();
-                   message.score = match.score;
-                   message.inlier = match.inlier;
-                   return message;
-                 });
+  std::transform(matches.begin(), matches.end(), messages.begin(), [](const MatchedPoint& match) {
+    PointMatch message;
+    message.reference_x = match.position.reference.x();
+    message.reference_y = match.position.reference.y();
+    message.current_x = match.position.current.x();
+    message.current_y = match.position.current.y();
+    message.score = match.score;
+    message.inlier = match.inlier;
+    return message;
+  });
   return messages;
 }
 

@@ -301,8 +301,8 @@ void listParameters()
   ViewMatcherParams defaults;
   for (const Parameter& parameter : matcherParameters(defaults))
   {
-    std::cout << parameter.name << " (" << parameter.type << ", default " << parameter.get() << "): "
-              << parameter.description << '\n';
+    std::cout << parameter.name << " (" << parameter.type << ", default " << parameter.get()
+              << "): " << parameter.description << '\n';
   }
 }
 

@@ -84,7 +84,8 @@ std::optional<Header> readJpegHeader(std::istream& file)
       marker = file.get();
     }
     const std::int64_t length = readNumber<2>(file);
-    const bool is_start_of_frame = marker >= 0xC0 && marker <= 0xCF && marker != 0xC4 && marker != 0xC8 && marker != 0xCC;
+    const bool is_start_of_frame =
+        marker >= 0xC0 && marker <= 0xCF && marker != 0xC4 && marker != 0xC8 && marker != 0xCC;
     if (is_start_of_frame)
     {
       file.get();  // bits a sample

@@ -22,7 +22,7 @@ constexpr double MAX_WIDTH = 1600.0;
 
 constexpr int GAP = 4;              // between the images [px]
 constexpr int CAPTION_HEIGHT = 30;  // [px]
-constexpr double LINE_OPACITY = 0.55;
+constexpr double LINE_OPACITY = 0.45;
 
 /** Coordinates handed to OpenCV are fixed-point numbers with this many fractional bits. */
 constexpr int SHIFT = 4;
@@ -108,7 +108,9 @@ Points outline(const cv::Rect& region)
 /** A homography up to scale, with the sign for which transfer() takes the inliers as in front of the camera. */
 Eigen::Matrix3d facingInliers(const ViewMatch& match)
 {
-  const auto is_inlier = [](const MatchedPoint& point) { return point.inlier; };
+  const auto is_inlier = [](const MatchedPoint& point) {
+    return point.inlier;
+  };
   const auto inlier = std::find_if(match.matches.begin(), match.matches.end(), is_inlier);
   const bool behind =
       inlier != match.matches.end() && match.matrix.row(2).dot(inlier->position.reference.homogeneous()) < 0.0;

@@ -27,14 +27,40 @@ constexpr std::size_t MIN_CORNERS = 8;
 constexpr int MAX_GUIDED_ROUNDS = 6;
 constexpr double HUBER_WIDTH = 0.5;  // of the final fits: residuals beyond count linearly [px]
 
-/** Which levels of reference and current image are compared, in the order of trial. */
+/** Which levels of reference and current image are compared. */
 struct LevelPair
 {
   int reference;
   int current;
 };
-constexpr LevelPair ATTEMPTS[] = { { 0, 0 }, { 2, 2 }, { 2, 0 }, { 0, 2 }, { 4, 4 },
-                                   { 3, 0 }, { 0, 3 }, { 4, 0 }, { 0, 4 } };
+// After the full images: both blurred (2, 2), the current one smaller by 2 (2, 0), larger by 2 (0, 2), and so on.
+constexpr LevelPair OTHER_SCALES[] = { { 2, 2 }, { 2, 0 }, { 0, 2 }, { 4, 4 }, { 3, 0 }, { 0, 3 }, { 4, 0 }, { 0, 4 } };
+
+/** One comparison. */
+struct Trial
+{
+  LevelPair levels;
+  double share;  ///< of the profiles that are searched for
+};
+
+std::vector<Trial> trials(const ViewMatcherParams& params)
+{
+  const double all = params.points.search.share;
+  std::vector<Trial> result;
+  if (params.first_share < all)
+  {
+    result.push_back({ { 0, 0 }, params.first_share });
+  }
+  result.push_back({ { 0, 0 }, all });
+  if (params.scale_search)
+  {
+    for (const LevelPair& levels : OTHER_SCALES)
+    {
+      result.push_back({ levels, all });
+    }
+  }
+  return result;
+}
 
 /** Adds the time since the last call, or since construction, to a stage. */
 class StageClock
@@ -225,16 +251,17 @@ struct Match
 class Attempt
 {
 public:
-  Attempt(const PreparedImage& reference, const PreparedImage& current, const LevelPair& levels,
-          const Geometry& geometry, const ViewMatcherParams& params)
+  Attempt(const PreparedImage& reference, const PreparedImage& current, const Trial& trial, const Geometry& geometry,
+          const ViewMatcherParams& params)
     : reference_(reference)
     , current_(current)
-    , levels_(levels)
+    , levels_(trial.levels)
     , geometry_(geometry)
     , params_(params)
-    , from_(reference.points(levels.reference))
-    , to_(current.points(levels.current))
+    , from_(reference.points(levels_.reference))
+    , to_(current.points(levels_.current))
   {
+    params_.points.search.share = trial.share;
   }
 
   bool hasFeatures() const
@@ -425,7 +452,7 @@ private:
   const PreparedImage& current_;
   const LevelPair levels_;
   const Geometry& geometry_;
-  const ViewMatcherParams& params_;
+  ViewMatcherParams params_;
   const PointFeatures& from_;
   const PointFeatures& to_;
   AssociationMatrix association_;
@@ -446,7 +473,11 @@ std::vector<std::string> ViewMatcherParams::validate() const
   }
   if (!(min_log_significance >= 0.0))
   {
-    faults.emplace_back("min_log_significance must be at least 0");
+    faults.emplace_back("min_significance must be at least 0");
+  }
+  if (!(first_share > 0.0 && first_share <= 1.0))
+  {
+    faults.emplace_back("first_share must lie in (0, 1]");
   }
   return faults;
 }
@@ -482,18 +513,13 @@ ViewMatch ViewMatcher::match(const PreparedImage& reference, const PreparedImage
   result.rms_error = NOT_A_NUMBER;
   StageClock clock(result.stages);
   bool any_features = false;
-  for (const LevelPair& levels : ATTEMPTS)
+  for (const Trial& trial : trials(params_))
   {
-    const bool first = levels.reference == 0 && levels.current == 0;
-    if (!first && !params_.scale_search)
-    {
-      break;
-    }
-    reference.profileIndex(levels.reference);
+    reference.profileIndex(trial.levels.reference);
     clock.finish("reference");
-    current.points(levels.current);
+    current.points(trial.levels.current);
     clock.finish("current");
-    Attempt attempt(reference, current, levels, geometry, params_);
+    Attempt attempt(reference, current, trial, geometry, params_);
     if (!attempt.hasFeatures())
     {
       continue;
@@ -505,8 +531,9 @@ ViewMatch ViewMatcher::match(const PreparedImage& reference, const PreparedImage
       attempt.guide();
       clock.finish("guided");
     }
-    if (accepted || first)  // without a geometry, the candidates of the first comparison are reported
+    if (accepted || (trial.levels.reference == 0 && trial.levels.current == 0))
     {
+      // Without a geometry, the candidates of the full images are reported.
       attempt.report(accepted, result);
     }
     if (accepted)

@@ -4,8 +4,8 @@
 
 #include "view_servo/views/image_io.h"
 
-#include <opencv2/imgcodecs.hpp>
 #include <yaml-cpp/yaml.h>
+#include <opencv2/imgcodecs.hpp>
 
 #include <fcntl.h>
 #include <unistd.h>
@@ -192,8 +192,8 @@ void check(const StoredView& view)
                                 " pixels, which is too " + (pixels > MAX_IMAGE_PIXELS ? "large" : "small"));
   }
   const cv::Rect& region = view.region;
-  if (!region.empty() && (region.x < 0 || region.y < 0 || region.width > image.cols - region.x ||
-                          region.height > image.rows - region.y))
+  if (!region.empty() &&
+      (region.x < 0 || region.y < 0 || region.width > image.cols - region.x || region.height > image.rows - region.y))
   {
     throw std::invalid_argument("its region of interest leaves the image");
   }

@@ -2,6 +2,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "view_servo/geometry/homography.h"
 
+#include "../../src/geometry/levenberg_marquardt.h"
 #include "../../src/geometry/residuals.h"
 #include "../support/synthetic_scene.h"
 
@@ -273,6 +274,51 @@ RC_GTEST_PROP(TransferResidual, JacobiansMatchNumericOnes, (std::uint64_t seed))
     RC_ASSERT((forward.col(k) - numeric_forward).norm() < 1e-6 * (1.0 + numeric_forward.norm()));
     RC_ASSERT((backward.col(k) - numeric_backward).norm() < 1e-6 * (1.0 + numeric_backward.norm()));
   }
+}
+
+/** One residual, atan(x): Gauss-Newton steps from |x| > 1.4 overshoot ever further. */
+struct ArcTangentProblem
+{
+  using State = double;
+  static constexpr int DOF = 1;
+
+  double cost(double x) const
+  {
+    return x > 10.0 ? NOT_A_NUMBER : std::atan(x) * std::atan(x);
+  }
+  void linearize(double x, Eigen::Matrix<double, 1, 1>& jtj, Eigen::Matrix<double, 1, 1>& gradient) const
+  {
+    const double derivative = 1.0 / (1.0 + x * x);
+    jtj(0) = derivative * derivative;
+    gradient(0) = derivative * std::atan(x);
+  }
+  double moved(double x, const Eigen::Matrix<double, 1, 1>& step) const
+  {
+    return x + step(0);
+  }
+};
+
+TEST(LevenbergMarquardt, DescendsWhereGaussNewtonDiverges)
+{
+  double previous = ArcTangentProblem().cost(-3.0);
+  for (int iterations = 1; iterations <= 5; ++iterations)
+  {
+    double x = -3.0;
+    EXPECT_TRUE(levenbergMarquardt(ArcTangentProblem(), x, iterations));
+    EXPECT_LT(ArcTangentProblem().cost(x), previous) << iterations;
+    previous = ArcTangentProblem().cost(x);
+  }
+  EXPECT_LT(previous, 1e-6);
+}
+
+TEST(LevenbergMarquardt, LeavesAMinimumAndAForbiddenStateAlone)
+{
+  double x = 0.0;
+  EXPECT_FALSE(levenbergMarquardt(ArcTangentProblem(), x, 10));
+  EXPECT_EQ(x, 0.0);
+  x = 11.0;
+  EXPECT_FALSE(levenbergMarquardt(ArcTangentProblem(), x, 10));
+  EXPECT_EQ(x, 11.0);
 }
 
 TEST(RefineHomography, LowersTheErrorAndGetsNearTheTruth)

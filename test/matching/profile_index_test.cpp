@@ -142,6 +142,31 @@ TEST(ProfileIndex, FindsOnlyWhatLiesWithinTheRadius)
   EXPECT_EQ(total, expected);  // the radius is not above the margin within which both directions are kept
 }
 
+TEST(ProfileIndex, SearchesForTheShareWithTheLargestFeatures)
+{
+  const ProfileSet reference = randomProfiles(300, 8, 9);
+  const ProfileSet current = randomProfiles(100, 8, 10);
+  ProfileSearchParams params;
+  params.share = 0.3;
+  const auto found = ProfileIndex(reference).search(current, params);
+  double smallest_searched = 1e9;
+  double largest_left_out = 0.0;
+  int searched = 0;
+  for (std::size_t i = 0; i < found.size(); ++i)
+  {
+    double norm = 0.0;
+    for (int c = 0; c < 8; ++c)
+    {
+      norm += std::pow(static_cast<double>(current.feature(i)[c]), 2);
+    }
+    searched += found[i].empty() ? 0 : 1;
+    (found[i].empty() ? largest_left_out : smallest_searched) =
+        found[i].empty() ? std::max(largest_left_out, norm) : std::min(smallest_searched, norm);
+  }
+  EXPECT_EQ(searched, 30);
+  EXPECT_GE(smallest_searched, largest_left_out);
+}
+
 TEST(ProfileIndex, DoesNotDependOnTheNumberOfThreads)
 {
   const ProfileSet reference = randomProfiles(1000, 8, 6);
@@ -192,7 +217,8 @@ TEST(ProfileSearchParams, NameEveryFault)
   params.neighbours = 0;
   params.radius = 0.0;
   params.epsilon = -1.0;
-  EXPECT_EQ(params.validate().size(), 3U);
+  params.share = 0.0;
+  EXPECT_EQ(params.validate().size(), 4U);
 }
 
 }  // namespace

@@ -91,8 +91,7 @@ public:
     return Model{ normal, normal.dot(centre) };
   }
 
-  bool (*acceptance)(const std::vector<int>&) = [](const std::vector<int>&)
-  {
+  bool (*acceptance)(const std::vector<int>&) = [](const std::vector<int>&) {
     return true;
   };
   mutable std::vector<std::vector<int>> samples;  ///< all that were solved
@@ -244,8 +243,7 @@ TEST(Sampler, ProgressiveStartsWithTheBestAndGrows)
 TEST(Sampler, ProgressiveGrowthFollowsTheSchedule)
 {
   // From the definition: T_n = T_N binom(n, m) / binom(N, m); T'_n sums the ceilings of its differences from 1 on.
-  const auto expected = [](int n)
-  {
+  const auto expected = [](int n) {
     return 500.0 * n * (n - 1) / (50.0 * 49.0);
   };
   Rng rng(7);
@@ -306,8 +304,7 @@ TEST(Ransac, ProgressiveSamplingMeetsAGoodSampleSooner)
     {
       points.push_back(unsorted[entry.second]);
     }
-    const auto samplesNeeded = [&](Sampling sampling)
-    {
+    const auto samplesNeeded = [&](Sampling sampling) {
       RansacParams params;
       params.sampling = sampling;
       params.max_iterations = 5000;
@@ -315,9 +312,9 @@ TEST(Ransac, ProgressiveSamplingMeetsAGoodSampleSooner)
       const LineEstimator estimator(points);
       Rng rng(seed);
       ransac(estimator, params, rng);
-      const auto good = std::find_if(estimator.samples.begin(), estimator.samples.end(),
-                                     [&](const auto& sample)
-                                     { return ranked[sample[0]].second < 50 && ranked[sample[1]].second < 50; });
+      const auto good = std::find_if(estimator.samples.begin(), estimator.samples.end(), [&](const auto& sample) {
+        return ranked[sample[0]].second < 50 && ranked[sample[1]].second < 50;
+      });
       return static_cast<int>(good - estimator.samples.begin()) + 1;
     };
     progressive += samplesNeeded(Sampling::PROGRESSIVE);
@@ -349,8 +346,7 @@ TEST(RansacParams, DefaultsAreValid)
 
 TEST(RansacParams, EveryFaultIsReported)
 {
-  const auto faults = [](auto change)
-  {
+  const auto faults = [](auto change) {
     RansacParams params;
     change(params);
     return params.validate().size();
@@ -365,13 +361,11 @@ TEST(RansacParams, EveryFaultIsReported)
   EXPECT_EQ(faults([](RansacParams& p) { p.max_rejected = -1; }), 1U);
   EXPECT_EQ(faults([](RansacParams& p) { p.local_optimizations = -1; }), 1U);
   EXPECT_EQ(faults([](RansacParams& p) { p.max_iterations = 0; }), 1U);
-  EXPECT_EQ(faults(
-                [](RansacParams& p)
-                {
-                  p.inlier_threshold = -1.0;
-                  p.confidence = 2.0;
-                  p.max_rejected = -3;
-                }),
+  EXPECT_EQ(faults([](RansacParams& p) {
+              p.inlier_threshold = -1.0;
+              p.confidence = 2.0;
+              p.max_rejected = -3;
+            }),
             3U);
 }
 
@@ -431,8 +425,7 @@ TEST(Ransac, SameSeedSameResult)
   for (const bool planar : { true, false })
   {
     const test::Scene scene = makeScene(planar, 100, 100, 1.0, 12);
-    const auto run = [&](const auto& estimator)
-    {
+    const auto run = [&](const auto& estimator) {
       Rng first_rng(12);
       Rng second_rng(12);
       Rng other_rng(13);
@@ -552,8 +545,7 @@ TEST(Ransac, RefusedSamplesAreCountedAndNotSolved)
 {
   const Points points = linePoints(50, 50, 0.1, 19);
   LineEstimator estimator(points);
-  estimator.acceptance = [](const std::vector<int>& sample)
-  {
+  estimator.acceptance = [](const std::vector<int>& sample) {
     return (sample[0] + sample[1]) % 2 == 0;
   };
   RansacParams params = uniformParams();
@@ -606,8 +598,7 @@ TEST(SequentialTest, KeepsModelsAsGoodAsTheBestAndDropsBadOnes)
   {
     detail::SequentialTest test;
     test.setBest(ratio);
-    const auto failures = [&](double inlier_ratio)
-    {
+    const auto failures = [&](double inlier_ratio) {
       int failed = 0;
       for (int run = 0; run < 2000; ++run)
       {
@@ -746,8 +737,7 @@ TEST(Ransac, ImprovementStageRespectsTheRejectionLimit)
   // Only the pairs that contain datum 0 are accepted: replacing it is refused 28 times or more.
   const Points points = linePoints(30, 0, 1.0, 23);
   LineEstimator estimator(points);
-  estimator.acceptance = [](const std::vector<int>& sample)
-  {
+  estimator.acceptance = [](const std::vector<int>& sample) {
     return sample[0] * sample[1] == 0;
   };
   RansacParams params = uniformParams();

@@ -128,14 +128,12 @@ TEST(ImageConversion, TurnsEveryEncodingIntoTheSameGrey)
   const cv::Mat bgr = examplePicture();
   cv::Mat grey;
   cv::cvtColor(bgr, grey, cv::COLOR_BGR2GRAY);
-  const auto convert = [&](int code)
-  {
+  const auto convert = [&](int code) {
     cv::Mat result;
     cv::cvtColor(bgr, result, code);
     return result;
   };
-  const auto wide = [](const cv::Mat& image)
-  {
+  const auto wide = [](const cv::Mat& image) {
     cv::Mat result;
     image.convertTo(result, CV_16U, 257.0);
     return result;

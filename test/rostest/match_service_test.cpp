@@ -246,8 +246,7 @@ TEST_F(MatchServiceTest, RefusesBadInputAndGoesOn)
   const std::string good = file("reference.png", picture_);
   std::ofstream((directory_.path() / "half.png").string(), std::ios::binary)
       << std::string(std::istreambuf_iterator<char>(std::ifstream(good, std::ios::binary).rdbuf()), {}).substr(0, 2000);
-  const std::string mirrored = [&]
-  {
+  const std::string mirrored = [&] {
     cv::Mat image;
     cv::flip(picture_, image, 1);
     return file("mirrored.png", image);
@@ -260,18 +259,14 @@ TEST_F(MatchServiceTest, RefusesBadInputAndGoesOn)
     std::function<void(MatchPoints::Request&)> spoil;
     std::string naming;
   };
-  const auto query = [](const std::string& path)
-  {
-    return [path](MatchPoints::Request& request)
-    {
+  const auto query = [](const std::string& path) {
+    return [path](MatchPoints::Request& request) {
       request.query = ImageSource();
       request.query.path = path;
     };
   };
-  const auto view = [](const std::string& name)
-  {
-    return [name](MatchPoints::Request& request)
-    {
+  const auto view = [](const std::string& name) {
+    return [name](MatchPoints::Request& request) {
       request.reference = ImageSource();
       request.reference.view = name;
     };
@@ -301,8 +296,7 @@ TEST_F(MatchServiceTest, RefusesBadInputAndGoesOn)
     { "unknown encoding", [](MatchPoints::Request& request) { request.query.image.encoding = "h264"; }, "h264" },
     { "data missing", [](MatchPoints::Request& request) { request.query.image.data.resize(100); }, "query.image" },
     { "data only",
-      [](MatchPoints::Request& request)
-      {
+      [](MatchPoints::Request& request) {
         request.query.image = sensor_msgs::Image();
         request.query.image.data.resize(100);
       },

@@ -81,8 +81,7 @@ TEST_F(SimTimeTest, ForgetsTheFutureWhenTimeJumpsBack)
   double now = 1000.0;
   MatchPoints::Response response;
   EXPECT_TRUE(waitUntil(
-      [&]
-      {
+      [&] {
         response = match();
         return static_cast<bool>(response.success);
       },
@@ -92,8 +91,7 @@ TEST_F(SimTimeTest, ForgetsTheFutureWhenTimeJumpsBack)
   // The bag starts again: the last image is one of the future until the camera has sent another.
   now = 10.0;
   EXPECT_TRUE(waitUntil(
-      [&]
-      {
+      [&] {
         response = match();
         return !response.success;
       },
@@ -101,8 +99,7 @@ TEST_F(SimTimeTest, ForgetsTheFutureWhenTimeJumpsBack)
   EXPECT_NE(response.message.find("future"), std::string::npos) << response.message;
 
   EXPECT_TRUE(waitUntil(
-      [&]
-      {
+      [&] {
         response = match();
         return static_cast<bool>(response.success);
       },

@@ -67,8 +67,7 @@ protected:
       SaveView::Response response;
       const ros::Time start = ros::Time::now();
       EXPECT_TRUE(waitUntil(
-          [&]
-          {
+          [&] {
             response = call<SaveView>("view_store/save", request);
             return response.success && call<GetView>("view_store/get", stored).image.header.stamp > start;
           },
@@ -129,9 +128,9 @@ TEST_F(StreamingTest, MatchesCameraImagesWithTheView)
   left_.teach("wall", picture_);
   ASSERT_TRUE(left_.setView("wall").success);
   left_.sent.clear();
-  ASSERT_TRUE(waitUntil([&]
-                        { return left_.matches.last() && left_.sent.count(left_.matches.last()->header.stamp) > 0; },
-                        [&] { left_.send(seen_); }));
+  ASSERT_TRUE(
+      waitUntil([&] { return left_.matches.last() && left_.sent.count(left_.matches.last()->header.stamp) > 0; },
+                [&] { left_.send(seen_); }));
 
   const PointMatches message = *left_.matches.last();
   EXPECT_EQ(message.header.frame_id, left_.camera.frame_id);
@@ -174,8 +173,7 @@ TEST_F(StreamingTest, KeepsTwoNamespacesApart)
   right_.teach("floor", seen_);
   ASSERT_TRUE(left_.setView("wall").success);
   ASSERT_TRUE(right_.setView("floor").success);
-  const auto matched = [](const Robot& robot, const std::string& view, const Eigen::Matrix3d& h)
-  {
+  const auto matched = [](const Robot& robot, const std::string& view, const Eigen::Matrix3d& h) {
     const std::optional<PointMatches> last = robot.matches.last();
     return last && last->view == view && last->homography.valid && cornerError(toMatrix(last->homography.h), h) < 1.5;
   };
@@ -183,8 +181,7 @@ TEST_F(StreamingTest, KeepsTwoNamespacesApart)
       [&] {
         return matched(left_, "wall", exampleHomography()) && matched(right_, "floor", exampleHomography().inverse());
       },
-      [&]
-      {
+      [&] {
         left_.send(seen_);
         right_.send(picture_);
       }));
@@ -210,8 +207,7 @@ TEST_F(StreamingTest, FollowsSetView)
   ASSERT_TRUE(right_.setView("floor").success);
   std::size_t images = 0;
   ASSERT_TRUE(waitUntil([&] { return right_.matches.messages().size() >= 5; },
-                        [&]
-                        {
+                        [&] {
                           left_.send(seen_);
                           right_.send(picture_);
                           ++images;
@@ -230,8 +226,7 @@ TEST_F(StreamingTest, PublishesNothingForAnUncalibratedCamera)
   const Recorder<diagnostic_msgs::DiagnosticArray> diagnostics("/diagnostics");
   const ros::Time since = ros::Time::now();
   EXPECT_TRUE(waitUntil(
-      [&]
-      {
+      [&] {
         return reported(diagnostics, "left/point_matcher",
                         { "not calibrated", "/left/camera/image_raw", "/left/camera/camera_info" });
       },
@@ -256,8 +251,7 @@ TEST_F(StreamingTest, MatchesTheLatestImageOnRequestUnlessItIsStale)
   request.reference.view = "wall";
   MatchPoints::Response response;
   EXPECT_TRUE(waitUntil(
-      [&]
-      {
+      [&] {
         response = left_.call<MatchPoints>("point_matcher/match", request);
         return response.success && cornerError(toMatrix(response.model_matrix), exampleHomography()) < 1.5;
       },
@@ -265,8 +259,7 @@ TEST_F(StreamingTest, MatchesTheLatestImageOnRequestUnlessItIsStale)
       << response.message;
 
   EXPECT_TRUE(waitUntil(
-      [&]
-      {
+      [&] {
         response = left_.call<MatchPoints>("point_matcher/match", request);
         return !response.success && response.message.find("old") != std::string::npos;
       },
@@ -297,18 +290,15 @@ TEST_F(StreamingTest, NamesBothTopicsWhenTheirStampsDiffer)
   ros::NodeHandle nh;
   const Recorder<diagnostic_msgs::DiagnosticArray> diagnostics("/diagnostics");
   ros::Publisher image_only = nh.advertise<sensor_msgs::Image>("right/camera/image_raw", 1);
-  const auto told = [&]
-  {
+  const auto told = [&] {
     return reported(diagnostics, "right/point_matcher",
                     { "same stamp", "/right/camera/image_raw", "/right/camera/camera_info" });
   };
-  EXPECT_TRUE(waitUntil(told,
-                        [&]
-                        {
-                          sensor_msgs::Image image = toMono8(picture_);
-                          image.header.stamp = ros::Time::now();
-                          image_only.publish(image);
-                        }));
+  EXPECT_TRUE(waitUntil(told, [&] {
+    sensor_msgs::Image image = toMono8(picture_);
+    image.header.stamp = ros::Time::now();
+    image_only.publish(image);
+  }));
 }
 
 }  // namespace

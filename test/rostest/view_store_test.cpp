@@ -104,14 +104,12 @@ TEST_F(ViewStoreNodeTest, StoresTheCameraImageWithAllThatIsKnown)
   GetView::Response view;
   ros::Time sent;
   ASSERT_TRUE(waitUntil(
-      [&]
-      {
+      [&] {
         const SaveView::Response response = call<SaveView>("save", request);
         view = get("desk");
         return response.success && view.has_pose;
       },
-      [&]
-      {
+      [&] {
         sent = ros::Time::now();
         camera_.publish(picture_, sent);
       }))
@@ -269,8 +267,7 @@ TEST_F(ViewStoreNodeTest, RefusesToStoreAnUncalibratedCamera)
   request.name = "never";
   SaveView::Response response;
   EXPECT_TRUE(waitUntil(
-      [&]
-      {
+      [&] {
         response = call<SaveView>("save", request);
         return response.message.find("not calibrated") != std::string::npos;
       },

@@ -103,8 +103,7 @@ inline Scene makeScene(const SceneOptions& options, Rng& rng)
   scene.homography = (scene.k * (scene.r + scene.t * scene.n.transpose() / scene.d) * k_inverse).normalized();
   scene.fundamental = (k_inverse.transpose() * crossMatrix(scene.t) * scene.r * k_inverse).normalized();
 
-  const auto noise = [&]
-  {
+  const auto noise = [&] {
     const double u = options.noise * gaussian(rng);
     return Eigen::Vector2d(u, options.noise * gaussian(rng));
   };

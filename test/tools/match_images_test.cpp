@@ -303,7 +303,7 @@ TEST_F(MatchImages, refusesUnknownParametersAndValues)
   expectBadInput(match(reference_, current_, { "--set", "max_cornerz=100" }), "max_cornerz");
   expectBadInput(match(reference_, current_, { "--set", "max_corners=many" }), "max_corners");
   expectBadInput(match(reference_, current_, { "--set", "max_corners=0" }), "max_corners");
-  expectBadInput(match(reference_, current_, { "--set", "max_corners=0", "--set", "min_length=-1" }), "max_corners");
+  expectBadInput(match(reference_, current_, { "--set", "max_corners=0", "--set", "profile_min_length=-1" }), "max_corners");
   expectBadInput(match(reference_, current_, { "--set", "max_corners" }), "max_corners");
 }
 
@@ -380,8 +380,8 @@ TEST_F(MatchImages, refusesHugeImages)
 TEST_F(MatchImages, findsNothingInConstantImages)
 {
   const std::string constant = write("constant.png", cv::Mat(360, 480, CV_8UC1, cv::Scalar(90)));
-  for (const json& result : { matchJson(constant, current_, 1), matchJson(reference_, constant, 1),
-                              matchJson(constant, constant, 1) })
+  for (const json& result :
+       { matchJson(constant, current_, 1), matchJson(reference_, constant, 1), matchJson(constant, constant, 1) })
   {
     EXPECT_EQ(result.at("success"), false);
     EXPECT_TRUE(result.at("matrix").is_null());

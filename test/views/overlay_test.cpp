@@ -162,7 +162,9 @@ TEST(Overlay, drawsWhatIsInFrontWhenThePlaneReachesTheHorizon)
 
 TEST(Overlay, saysWhatHappened)
 {
-  const auto caption = [](const cv::Mat& picture) { return picture.rowRange(200, picture.rows).clone(); };
+  const auto caption = [](const cv::Mat& picture) {
+    return picture.rowRange(200, picture.rows).clone();
+  };
   ViewMatch match = noMatch();
   const cv::Mat first = caption(drawOverlay(image(450, 200), image(450, 200), match));
   match.message = "something else that is very, very long: " + std::string(300, 'x');

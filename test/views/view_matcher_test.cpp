@@ -302,7 +302,8 @@ TEST(ViewMatcherParams, NameTheFaultsOfAllPartsAtOnce)
   params.consistency.threshold = 0.0;
   params.guidance.patch_radius = 0;
   params.min_log_significance = -1.0;
-  EXPECT_EQ(params.validate().size(), 5U);
+  params.first_share = 0.0;
+  EXPECT_EQ(params.validate().size(), 6U);
   EXPECT_THROW(ViewMatcher{ params }, std::invalid_argument);
 }
 

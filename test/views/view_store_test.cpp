@@ -137,7 +137,8 @@ std::string errorOf(const Action& action)
   return "no error";
 }
 
-#define EXPECT_ERROR(action, part) EXPECT_NE(errorOf([&] { action; }).find(part), std::string::npos) << errorOf([&] { action; })
+#define EXPECT_ERROR(action, part) \
+  EXPECT_NE(errorOf([&] { action; }).find(part), std::string::npos) << errorOf([&] { action; })
 
 class ViewStoreTest : public ::testing::Test
 {

@@ -12,10 +12,10 @@ namespace view_servo
 /** Calibration of a pinhole camera, with the meaning of sensor_msgs/CameraInfo (REP 104). */
 struct Camera
 {
-  int width = 0;   ///< of the calibrated image [px]
+  int width = 0;  ///< of the calibrated image [px]
   int height = 0;
-  std::string distortion_model;    ///< "plumb_bob", "rational_polynomial" or empty: not distorted
-  std::vector<double> distortion;  ///< in the order of the model
+  std::string distortion_model;                 ///< "plumb_bob", "rational_polynomial" or empty: not distorted
+  std::vector<double> distortion;               ///< in the order of the model
   Eigen::Matrix3d k = Eigen::Matrix3d::Zero();  ///< intrinsics of the raw image [px]; zero = uncalibrated
   Eigen::Matrix3d rectification = Eigen::Matrix3d::Identity();
   Eigen::Matrix<double, 3, 4> projection = Eigen::Matrix<double, 3, 4>::Zero();  ///< of the rectified image [px]

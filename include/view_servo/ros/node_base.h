@@ -41,8 +41,7 @@ protected:
   template <typename Node, typename Request, typename Response>
   ros::ServiceServer serve(const std::string& name, void (Node::*method)(const Request&, Response&), Node* node)
   {
-    const boost::function<bool(Request&, Response&)> callback = [method, node](Request& request, Response& response)
-    {
+    const boost::function<bool(Request&, Response&)> callback = [method, node](Request& request, Response& response) {
       try
       {
         (node->*method)(request, response);

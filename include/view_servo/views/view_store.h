@@ -27,13 +27,13 @@ struct ViewPose
 /** A picture of where the camera should be, with all that was known when it was taken. */
 struct StoredView
 {
-  std::string name;             ///< see isValidViewName()
-  cv::Mat image;                ///< 8-bit grey
-  cv::Rect region;              ///< region of interest [px]; empty = the whole image
+  std::string name;  ///< see isValidViewName()
+  cv::Mat image;     ///< 8-bit grey
+  cv::Rect region;   ///< region of interest [px]; empty = the whole image
   std::optional<Camera> camera;
-  double stamp = 0.0;           ///< when the image was taken [s since the epoch of its clock]
-  std::string frame_id;         ///< optical frame of the camera, may be empty
-  std::optional<ViewPose> pose; ///< of `frame_id`, where tf knew it
+  double stamp = 0.0;            ///< when the image was taken [s since the epoch of its clock]
+  std::string frame_id;          ///< optical frame of the camera, may be empty
+  std::optional<ViewPose> pose;  ///< of `frame_id`, where tf knew it
 };
 
 /** Why a view cannot be stored, read or removed; what() names the view, in one line. */
