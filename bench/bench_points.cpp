@@ -88,8 +88,7 @@ double cornerError(const Answer& answer, const Problem& problem)
   double sum = 0.0;
   for (const Eigen::Vector2d& corner : Points{ { 0, 0 }, { right, 0 }, { right, bottom }, { 0, bottom } })
   {
-    sum += ((*answer.h * corner.homogeneous()).hnormalized() -
-            (problem.truth * corner.homogeneous()).hnormalized())
+    sum += ((*answer.h * corner.homogeneous()).hnormalized() - (problem.truth * corner.homogeneous()).hnormalized())
                .norm() /
            4.0;
   }
@@ -226,9 +225,10 @@ int oxford(const ViewMatcherParams& params)
   }
   std::sort(sequences.begin(), sequences.end());
   std::printf("%-12s | %-31s | %-31s | %-31s\n", "", "view_servo", "SIFT 500", "AKAZE");
-  std::printf("%-12s | cand  inl correct  corner     ms | cand  inl correct  corner     ms | cand  inl correct  corner"
-              "     ms\n",
-              "pair");
+  std::printf(
+      "%-12s | cand  inl correct  corner     ms | cand  inl correct  corner     ms | cand  inl correct  corner"
+      "     ms\n",
+      "pair");
   int solved[3] = {};
   int more_than_sift = 0;
   int total = 0;
@@ -264,8 +264,9 @@ int oxford(const ViewMatcherParams& params)
 /** A texture of Debian's packages; empty when the package is not installed. */
 cv::Mat loadTexture(const std::string& name)
 {
-  for (const char* folder : { "/usr/share/doc/opencv-doc/examples/data", "/usr/share/doc/opencv-doc/opencv4/samples/data",
-                              "/usr/share/visp-images-data/ViSP-images" })
+  for (const char* folder :
+       { "/usr/share/doc/opencv-doc/examples/data", "/usr/share/doc/opencv-doc/opencv4/samples/data",
+         "/usr/share/visp-images-data/ViSP-images" })
   {
     if (!std::filesystem::exists(folder))
     {
@@ -343,9 +344,18 @@ int tilt(const ViewMatcherParams& params)
   ViewMatcherParams votes = cyclic;
   votes.points.cyclic_order = false;
   const std::vector<std::pair<std::string, std::function<Answer(const Problem&)>>> pipelines = {
-    { "view_servo", [&](const Problem& p) { return runOurs(params, p); } },
-    { "not guided", [&](const Problem& p) { return runOurs(cyclic, p); } },
-    { "nor cyclic order", [&](const Problem& p) { return runOurs(votes, p); } },
+    { "view_servo",
+      [&](const Problem& p) {
+        return runOurs(params, p);
+      } },
+    { "not guided",
+      [&](const Problem& p) {
+        return runOurs(cyclic, p);
+      } },
+    { "nor cyclic order",
+      [&](const Problem& p) {
+        return runOurs(votes, p);
+      } },
     { "SIFT 500", runSift },
     { "AKAZE", runAkaze },
   };

@@ -118,7 +118,9 @@ std::vector<Peak> localMaxima(const cv::Mat& response, const cv::Mat& mask, int 
 /** Where the quadratic through the 3x3 neighbourhood (least squares) has its maximum, at most one pixel away. */
 Eigen::Vector2d refinePeak(const cv::Mat& response, const Peak& peak)
 {
-  const auto r = [&](int du, int dv) { return static_cast<double>(response.at<float>(peak.v + dv, peak.u + du)); };
+  const auto r = [&](int du, int dv) {
+    return static_cast<double>(response.at<float>(peak.v + dv, peak.u + du));
+  };
   double gu = 0.0;
   double gv = 0.0;
   double huu = 0.0;

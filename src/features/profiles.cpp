@@ -151,8 +151,8 @@ std::vector<ProfileSet::Pair> selectPairs(const std::vector<Corner>& corners, co
 {
   const std::size_t n = corners.size();
   const double min_squared = params.min_length * params.min_length;
-  const double max_squared = params.selection == PairSelection::RADIUS ? params.max_length * params.max_length :
-                                                                         std::numeric_limits<double>::infinity();
+  const double max_squared = params.selection == PairSelection::RADIUS ? params.max_length * params.max_length
+                                                                       : std::numeric_limits<double>::infinity();
   const std::size_t limit =
       params.selection == PairSelection::NEAREST ? static_cast<std::size_t>(params.neighbours) : n;
   std::vector<char> chosen(n * n, 0);  // row i: the corners that i is paired with
@@ -255,9 +255,9 @@ ProfileSet extractProfiles(const cv::Mat& image, const std::vector<Corner>& corn
       const std::size_t k = static_cast<std::size_t>(i);
       const Eigen::Vector2d& start = corners[static_cast<std::size_t>(pairs[k].start)].position;
       const Eigen::Vector2d& end = corners[static_cast<std::size_t>(pairs[k].end)].position;
-      described[k] = inside(image, start) && inside(image, end) &&
-                     describe(image, start, end, params.coefficients, tables, params.min_contrast,
-                              features.data() + k * columns);
+      described[k] =
+          inside(image, start) && inside(image, end) &&
+          describe(image, start, end, params.coefficients, tables, params.min_contrast, features.data() + k * columns);
     }
   });
   for (std::size_t k = 0; k < pairs.size(); ++k)

@@ -33,13 +33,13 @@ class SparseAssignment
 {
 public:
   explicit SparseAssignment(const AssociationMatrix& association)
-    : association_(association)
-    , row_match_(static_cast<std::size_t>(association.rows()), NONE)
-    , column_match_(static_cast<std::size_t>(association.columns()), -1)
-    , price_(static_cast<std::size_t>(association.columns()), 0.0)
-    , distance_(static_cast<std::size_t>(association.columns()), INFINITE_COST)
-    , done_(static_cast<std::size_t>(association.columns()), 0)
-    , entry_to_(static_cast<std::size_t>(association.columns()), NONE)
+    : association_(association),
+      row_match_(static_cast<std::size_t>(association.rows()), NONE),
+      column_match_(static_cast<std::size_t>(association.columns()), -1),
+      price_(static_cast<std::size_t>(association.columns()), 0.0),
+      distance_(static_cast<std::size_t>(association.columns()), INFINITE_COST),
+      done_(static_cast<std::size_t>(association.columns()), 0),
+      entry_to_(static_cast<std::size_t>(association.columns()), NONE)
   {
     for (int row = 0; row < association.rows(); ++row)
     {

@@ -166,8 +166,7 @@ std::vector<GuidedMatch> searchAlongHomography(const cv::Mat& reference, const s
       const int k = static_cast<int>(best - correlations.begin());
       const int du = k % side;
       const int dv = k / side;
-      if (du == 0 || dv == 0 || du == side - 1 || dv == side - 1 ||
-          static_cast<double>(*best) < params.min_correlation)
+      if (du == 0 || dv == 0 || du == side - 1 || dv == side - 1 || static_cast<double>(*best) < params.min_correlation)
       {
         continue;
       }

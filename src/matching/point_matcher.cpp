@@ -56,11 +56,11 @@ float correlation(const float* a, const float* b, int columns, bool reversed)
  */
 std::uint32_t directionKey(const std::vector<Corner>& corners, int corner, int neighbour)
 {
-  const Eigen::Vector2d d = corners[static_cast<std::size_t>(neighbour)].position -
-                            corners[static_cast<std::size_t>(corner)].position;
+  const Eigen::Vector2d d =
+      corners[static_cast<std::size_t>(neighbour)].position - corners[static_cast<std::size_t>(corner)].position;
   const double length = std::abs(d.x()) + std::abs(d.y());
-  const double slope = length > 0.0 ? d.y() / length : 0.0;           // -1 .. 1
-  const double angle = d.x() >= 0.0 ? 1.0 + slope : 3.0 - slope;      // 0 .. 4, from straight up to straight up
+  const double slope = length > 0.0 ? d.y() / length : 0.0;       // -1 .. 1
+  const double angle = d.x() >= 0.0 ? 1.0 + slope : 3.0 - slope;  // 0 .. 4, from straight up to straight up
   const std::uint32_t steps = static_cast<std::uint32_t>(angle * 16383.0);
   return steps << 16U | static_cast<std::uint32_t>(neighbour);
 }
@@ -84,8 +84,7 @@ std::vector<char> strongestEntries(const std::vector<float>& matrix, std::size_t
             line.emplace_back(-matrix[place], place);
           }
         }
-        const std::size_t wanted =
-            count > 0 ? std::min(line.size(), static_cast<std::size_t>(count)) : line.size();
+        const std::size_t wanted = count > 0 ? std::min(line.size(), static_cast<std::size_t>(count)) : line.size();
         std::partial_sort(line.begin(), line.begin() + static_cast<std::ptrdiff_t>(wanted), line.end());
         for (std::size_t k = 0; k < wanted; ++k)
         {
@@ -145,26 +144,27 @@ GroupedVotes groupVotes(const PointFeatures& reference, const PointFeatures& cur
         {
           const std::size_t r = static_cast<std::size_t>(match.reference);
           float weight = -1.0F;  // not yet computed
-          visitEnds(reference.profiles.pairs[r], current.profiles.pairs[p], match.reversed,
-                    [&](int row, int column, int row_neighbour, int column_neighbour) {
-                      const int entry = entry_of[static_cast<std::size_t>(row) * current.corners.size() +
-                                                 static_cast<std::size_t>(column)];
-                      if (entry < 0)
-                      {
-                        return;
-                      }
-                      if (weight < 0.0F)
-                      {
-                        weight = std::max(0.0F, correlation(reference.profiles.feature(r), current.profiles.feature(p),
-                                                            current.profiles.coefficients, match.reversed));
-                      }
-                      if (weight > 0.0F && static_cast<double>(weight) >= params.min_correlation)
-                      {
-                        parts[part].push_back({ static_cast<std::size_t>(entry),
-                                                { directionKey(reference.corners, row, row_neighbour),
-                                                  directionKey(current.corners, column, column_neighbour), weight } });
-                      }
-                    });
+          visitEnds(
+              reference.profiles.pairs[r], current.profiles.pairs[p], match.reversed,
+              [&](int row, int column, int row_neighbour, int column_neighbour) {
+                const int entry =
+                    entry_of[static_cast<std::size_t>(row) * current.corners.size() + static_cast<std::size_t>(column)];
+                if (entry < 0)
+                {
+                  return;
+                }
+                if (weight < 0.0F)
+                {
+                  weight = std::max(0.0F, correlation(reference.profiles.feature(r), current.profiles.feature(p),
+                                                      current.profiles.coefficients, match.reversed));
+                }
+                if (weight > 0.0F && static_cast<double>(weight) >= params.min_correlation)
+                {
+                  parts[part].push_back({ static_cast<std::size_t>(entry),
+                                          { directionKey(reference.corners, row, row_neighbour),
+                                            directionKey(current.corners, column, column_neighbour), weight } });
+                }
+              });
         }
       }
     }
@@ -281,7 +281,8 @@ AssociationMatrix associatePoints(const PointFeatures& reference, const ProfileI
     if (params.cyclic_order ? chosen[k] != 0 : votes[k] > 0.0F)
     {
       entry_of[k] = static_cast<int>(entries.size());
-      entries.push_back({ static_cast<int>(k / columns), static_cast<int>(k % columns), static_cast<double>(votes[k]) });
+      entries.push_back(
+          { static_cast<int>(k / columns), static_cast<int>(k % columns), static_cast<double>(votes[k]) });
     }
   }
   if (params.cyclic_order)

@@ -42,7 +42,9 @@ template <typename T>
 Parameter number(std::string name, const char* type, T& value, std::string description)
 {
   return { std::move(name), type, std::move(description), [&value] { return print(value); },
-           [&value](const std::string& text) { return parse(text, value); } };
+           [&value](const std::string& text) {
+             return parse(text, value);
+           } };
 }
 
 Parameter integer(std::string name, int& value, std::string description)
@@ -167,7 +169,8 @@ std::vector<Parameter> matcherParameters(ViewMatcherParams& params)
     real("pair_radius", profiles.max_length, "D_c: longest profile [px], > profile_min_length"),
     real("profile_min_length", profiles.min_length, "shortest profile [px], >= 2"),
     integer("coefficients", profiles.coefficients, "N_f: Fourier features a profile, 4, 6 or 8"),
-    real("profile_contrast", profiles.min_contrast, "least deviation of a profile from its mean [grey levels], (0, 255)"),
+    real("profile_contrast", profiles.min_contrast,
+         "least deviation of a profile from its mean [grey levels], (0, 255)"),
     choice<ProfileSearch>("search", search.search,
                           { { "nearest", ProfileSearch::NEAREST }, { "radius", ProfileSearch::RADIUS } },
                           "a profile votes for its nearest (K_v) or for all in a radius (D_v)"),
@@ -202,7 +205,8 @@ std::vector<Parameter> matcherParameters(ViewMatcherParams& params)
     boolean("guided", params.guided, "look for more matches along the geometry found"),
     integer("patch_radius", params.guidance.patch_radius, "patches compared by guided matching [px], 1 to 50"),
     real("patch_correlation", params.guidance.min_correlation, "least correlation of the patches, [0, 1)"),
-    real("first_share", params.first_share, "part of the profiles that votes at first, all if it is too little, (0, 1]"),
+    real("first_share", params.first_share,
+         "part of the profiles that votes at first, all if it is too little, (0, 1]"),
     boolean("scale_search", params.scale_search, "try other scales when the first finds no geometry"),
     real("min_significance", params.min_log_significance, "-log10 of the false alarms a geometry may have, >= 0"),
     natural("seed", params.seed, "of all random draws, >= 0"),

@@ -178,8 +178,8 @@ public:
 
   double squaredError(const Eigen::Matrix3d& matrix, const Correspondence& pair) const
   {
-    return model_ == GeometryModel::HOMOGRAPHY ? 0.5 * symmetricTransferError(matrix, matrix.inverse(), pair) :
-                                                 sampsonError(matrix, pair);
+    return model_ == GeometryModel::HOMOGRAPHY ? 0.5 * symmetricTransferError(matrix, matrix.inverse(), pair)
+                                               : sampsonError(matrix, pair);
   }
 
   bool agrees(const Eigen::Matrix3d& matrix, const Correspondence& pair) const
@@ -189,8 +189,8 @@ public:
 
   Eigen::Matrix3d refine(const Eigen::Matrix3d& matrix, const Correspondences& pairs) const
   {
-    return model_ == GeometryModel::HOMOGRAPHY ? refineHomography(matrix, pairs, HUBER_WIDTH) :
-                                                 refineFundamental(matrix, pairs, HUBER_WIDTH);
+    return model_ == GeometryModel::HOMOGRAPHY ? refineHomography(matrix, pairs, HUBER_WIDTH)
+                                               : refineFundamental(matrix, pairs, HUBER_WIDTH);
   }
 
 private:
@@ -253,13 +253,13 @@ class Attempt
 public:
   Attempt(const PreparedImage& reference, const PreparedImage& current, const Trial& trial, const Geometry& geometry,
           const ViewMatcherParams& params)
-    : reference_(reference)
-    , current_(current)
-    , levels_(trial.levels)
-    , geometry_(geometry)
-    , params_(params)
-    , from_(reference.points(levels_.reference))
-    , to_(current.points(levels_.current))
+    : reference_(reference),
+      current_(current),
+      levels_(trial.levels),
+      geometry_(geometry),
+      params_(params),
+      from_(reference.points(levels_.reference)),
+      to_(current.points(levels_.current))
   {
     params_.points.search.share = trial.share;
   }
@@ -277,8 +277,8 @@ public:
     Correspondences pairs;
     for (const Association& candidate : candidateMatches(association_, params_.points.assignment))
     {
-      candidates_.push_back({ candidate.row, to_.corners[static_cast<std::size_t>(candidate.column)].position,
-                              candidate.weight });
+      candidates_.push_back(
+          { candidate.row, to_.corners[static_cast<std::size_t>(candidate.column)].position, candidate.weight });
       pairs.push_back(correspondence(candidates_.back()));
     }
     clock.finish("assignment");
@@ -303,9 +303,8 @@ public:
     {
       return false;
     }
-    result.log_significance =
-        logSignificance(pairs.size(), fit->inliers.size(), geometry_.sampleSize(),
-                        geometry_.chance(current_.image(levels_.current).size()));
+    result.log_significance = logSignificance(pairs.size(), fit->inliers.size(), geometry_.sampleSize(),
+                                              geometry_.chance(current_.image(levels_.current).size()));
     Correspondences supporting;
     for (const int i : fit->inliers)
     {
@@ -391,10 +390,10 @@ public:
     result.outcome = MatchOutcome::MATCHED;
     result.inliers = static_cast<int>(inliers_.size());
     result.rms_error = std::sqrt(squares / static_cast<double>(inliers_.size()));
-    result.matrix = geometry_.isHomography() ?
-                        normalizedHomography(current_map * matrix_ * reference_map.inverse()) :
-                        Eigen::Matrix3d((current_map.inverse().transpose() * matrix_ * reference_map.inverse())
-                                            .normalized());
+    result.matrix =
+        geometry_.isHomography()
+            ? normalizedHomography(current_map * matrix_ * reference_map.inverse())
+            : Eigen::Matrix3d((current_map.inverse().transpose() * matrix_ * reference_map.inverse()).normalized());
     result.reference_level = levels_.reference;
     result.current_level = levels_.current;
   }
@@ -438,9 +437,8 @@ private:
   std::vector<Match> alongFundamental() const
   {
     std::vector<Match> matches;
-    for (const Association& match :
-         maximumWeightMatching(associateAlongFundamental(association_, from_.corners, to_.corners, matrix_,
-                                                         geometry_.threshold())))
+    for (const Association& match : maximumWeightMatching(
+             associateAlongFundamental(association_, from_.corners, to_.corners, matrix_, geometry_.threshold())))
     {
       matches.push_back({ match.row, to_.corners[static_cast<std::size_t>(match.column)].position,
                           association_.weight(match.row, match.column) });
@@ -551,9 +549,9 @@ ViewMatch ViewMatcher::match(const PreparedImage& reference, const PreparedImage
   else if (!any_features)
   {
     result.outcome = MatchOutcome::TOO_FEW_FEATURES;
-    result.message = "too few corners: " + std::to_string(reference.points(0).corners.size()) +
-                     " in the reference, " + std::to_string(current.points(0).corners.size()) +
-                     " in the current image, " + std::to_string(MIN_CORNERS) + " needed in each";
+    result.message = "too few corners: " + std::to_string(reference.points(0).corners.size()) + " in the reference, " +
+                     std::to_string(current.points(0).corners.size()) + " in the current image, " +
+                     std::to_string(MIN_CORNERS) + " needed in each";
   }
   else
   {

@@ -35,7 +35,9 @@ cv::Mat square()
   const int over = 20;
   cv::Mat large(100 * over, 120 * over, CV_8UC1, cv::Scalar(40));
   // Pixel centres are at whole numbers, so pixel u covers u - 0.5 .. u + 0.5.
-  const auto at = [&](double x) { return static_cast<int>(std::lround((x + 0.5) * over)); };
+  const auto at = [&](double x) {
+    return static_cast<int>(std::lround((x + 0.5) * over));
+  };
   large(cv::Range(at(32.6), at(62.6)), cv::Range(at(41.3), at(71.3))).setTo(200);
   cv::Mat image;
   cv::resize(large, image, cv::Size(120, 100), 0.0, 0.0, cv::INTER_AREA);
@@ -130,9 +132,8 @@ TEST(Corners, RepeatUnderNoiseAndLight)
   params.max_corners = 200;
   const std::vector<Corner> before = detectCorners(picture, params);
   const std::vector<Corner> after = detectCorners(view_servo::test::disturbed(picture, 0.7, 20.0, 3.0), params);
-  const auto repeated = std::count_if(before.begin(), before.end(), [&](const Corner& corner) {
-    return nearest(after, corner.position) < 0.5;
-  });
+  const auto repeated = std::count_if(before.begin(), before.end(),
+                                      [&](const Corner& corner) { return nearest(after, corner.position) < 0.5; });
   EXPECT_GT(repeated, 160);
 }
 

@@ -5,9 +5,9 @@
 #include "support/textured_plane.h"
 
 #include <gtest/gtest.h>
+#include <rapidcheck/gtest.h>
 #include <opencv2/core.hpp>
 #include <opencv2/imgproc.hpp>
-#include <rapidcheck/gtest.h>
 
 #include <cmath>
 #include <set>
@@ -77,7 +77,9 @@ TEST(Profiles, KeepTheirFeaturesWhenTheImageIsEnlarged)
   cv::GaussianBlur(texturedPicture(3), small, cv::Size(), 2.0);
   cv::Mat large;
   cv::resize(small, large, cv::Size(), 2.0, 2.0, cv::INTER_CUBIC);
-  const auto enlarged = [](const Eigen::Vector2d& x) { return Eigen::Vector2d(2.0 * x.array() + 0.5); };
+  const auto enlarged = [](const Eigen::Vector2d& x) {
+    return Eigen::Vector2d(2.0 * x.array() + 0.5);
+  };
   cv::RNG rng(5);
   double worst = 0.0;
   int compared = 0;

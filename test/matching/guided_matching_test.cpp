@@ -5,8 +5,8 @@
 #include "support/synthetic_scene.h"
 #include "support/textured_plane.h"
 
-#include <Eigen/Geometry>
 #include <gtest/gtest.h>
+#include <Eigen/Geometry>
 #include <opencv2/core.hpp>
 
 #include <cmath>
@@ -78,15 +78,14 @@ TEST_F(SearchAlongHomography, FindsLittleAlongAWrongOne)
 {
   Eigen::Matrix3d wrong = truth_;
   wrong(0, 2) += 60.0;
-  const std::size_t found =
-      searchAlongHomography(reference_, corners_, current_, wrong, 3.0, GuidedParams()).size();
+  const std::size_t found = searchAlongHomography(reference_, corners_, current_, wrong, 3.0, GuidedParams()).size();
   EXPECT_LT(found, corners_.size() / 20);
 }
 
 TEST_F(SearchAlongHomography, SurvivesHomographiesThatAreNone)
 {
-  EXPECT_TRUE(searchAlongHomography(reference_, corners_, current_, Eigen::Matrix3d::Zero(), 3.0, GuidedParams())
-                  .empty());
+  EXPECT_TRUE(
+      searchAlongHomography(reference_, corners_, current_, Eigen::Matrix3d::Zero(), 3.0, GuidedParams()).empty());
   Eigen::Matrix3d flat = Eigen::Matrix3d::Identity();
   flat.row(1) = flat.row(0);
   EXPECT_TRUE(searchAlongHomography(reference_, corners_, current_, flat, 3.0, GuidedParams()).empty());

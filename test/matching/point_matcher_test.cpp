@@ -4,18 +4,18 @@
 
 #include "support/textured_plane.h"
 
-#include <Eigen/Geometry>
 #include <gtest/gtest.h>
+#include <Eigen/Geometry>
 #include <opencv2/core.hpp>
 
 #include <vector>
 
 namespace
 {
+using view_servo::AssignmentMethod;
 using view_servo::associatePoints;
 using view_servo::Association;
 using view_servo::AssociationMatrix;
-using view_servo::AssignmentMethod;
 using view_servo::candidateMatches;
 using view_servo::extractPointFeatures;
 using view_servo::PointFeatures;
@@ -92,9 +92,9 @@ TEST_F(PointMatcher, MatchesInAllVariants)
             params_.cyclic_order = cyclic;
             const double share = correct(picture_, warped_, exampleHomography());
             EXPECT_GT(share, 0.25) << "radius pairs " << (selection == view_servo::PairSelection::RADIUS)
-                                   << ", radius search " << (search == view_servo::ProfileSearch::RADIUS)
-                                   << ", greedy " << (assignment == AssignmentMethod::GREEDY) << ", N_f "
-                                   << coefficients << ", cyclic " << cyclic;
+                                   << ", radius search " << (search == view_servo::ProfileSearch::RADIUS) << ", greedy "
+                                   << (assignment == AssignmentMethod::GREEDY) << ", N_f " << coefficients
+                                   << ", cyclic " << cyclic;
           }
         }
       }

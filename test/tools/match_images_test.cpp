@@ -303,7 +303,8 @@ TEST_F(MatchImages, refusesUnknownParametersAndValues)
   expectBadInput(match(reference_, current_, { "--set", "max_cornerz=100" }), "max_cornerz");
   expectBadInput(match(reference_, current_, { "--set", "max_corners=many" }), "max_corners");
   expectBadInput(match(reference_, current_, { "--set", "max_corners=0" }), "max_corners");
-  expectBadInput(match(reference_, current_, { "--set", "max_corners=0", "--set", "profile_min_length=-1" }), "max_corners");
+  expectBadInput(match(reference_, current_, { "--set", "max_corners=0", "--set", "profile_min_length=-1" }),
+                 "max_corners");
   expectBadInput(match(reference_, current_, { "--set", "max_corners" }), "max_corners");
 }
 

@@ -4,8 +4,8 @@
 
 #include "support/textured_plane.h"
 
-#include <Eigen/Geometry>
 #include <gtest/gtest.h>
+#include <Eigen/Geometry>
 #include <opencv2/core.hpp>
 
 #include <atomic>

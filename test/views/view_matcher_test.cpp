@@ -6,9 +6,9 @@
 
 #include "support/textured_plane.h"
 
+#include <gtest/gtest.h>
 #include <Eigen/Geometry>
 #include <Eigen/LU>
-#include <gtest/gtest.h>
 #include <opencv2/core.hpp>
 #include <opencv2/imgproc.hpp>
 
@@ -193,8 +193,8 @@ TEST(ViewMatcher, FindsNothingInUnrelatedPictures)
   {
     for (int seed = 0; seed < 4; ++seed)
     {
-      const ViewMatch match = matchImages(ViewMatcherParams(), texturedPicture(100 + seed),
-                                          texturedPicture(200 + seed), model);
+      const ViewMatch match =
+          matchImages(ViewMatcherParams(), texturedPicture(100 + seed), texturedPicture(200 + seed), model);
       EXPECT_EQ(match.outcome, MatchOutcome::NO_GEOMETRY) << "seed " << seed << ": " << match.message;
       EXPECT_EQ(match.inliers, 0);
       EXPECT_TRUE(match.matrix.array().isNaN().all());

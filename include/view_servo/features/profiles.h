@@ -22,11 +22,11 @@ enum class PairSelection
 struct ProfileParams
 {
   PairSelection selection = PairSelection::NEAREST;
-  int neighbours = 50;         ///< K_c: pairs a corner starts (NEAREST), >= 1
-  double max_length = 200.0;   ///< D_c: longest profile (RADIUS) [px], > min_length
-  double min_length = 10.0;    ///< shortest profile [px], >= 2
-  int coefficients = 8;        ///< N_f: 4, 6 or 8 Fourier features a profile
-  double min_contrast = 6.0;   ///< profiles whose intensity stays closer to its mean than this say nothing [grey levels]
+  int neighbours = 50;        ///< K_c: pairs a corner starts (NEAREST), >= 1
+  double max_length = 200.0;  ///< D_c: longest profile (RADIUS) [px], > min_length
+  double min_length = 10.0;   ///< shortest profile [px], >= 2
+  int coefficients = 8;       ///< N_f: 4, 6 or 8 Fourier features a profile
+  double min_contrast = 6.0;  ///< profiles whose intensity stays closer to its mean than this say nothing [grey levels]
 
   /** All faults, one a line; empty when the parameters are usable. */
   std::vector<std::string> validate() const;
@@ -48,9 +48,9 @@ struct ProfileSet
     int end;
   };
 
-  int coefficients = 0;        ///< features a profile
+  int coefficients = 0;  ///< features a profile
   std::vector<Pair> pairs;
-  std::vector<float> features; ///< pairs.size() x coefficients, row-major
+  std::vector<float> features;  ///< pairs.size() x coefficients, row-major
 
   const float* feature(std::size_t pair) const
   {

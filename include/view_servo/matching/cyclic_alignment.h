@@ -52,8 +52,8 @@ private:
   float best_ = 0.0F;
   std::vector<float> weights_;  // rows_ x 2 columns_: each row of the caller's twice
   std::vector<float> gains_;    // of the first k columns together: sums of their largest weights
-  std::vector<float> table_;  // (rows_ + 1) x (2 columns_ + 1)
-  std::vector<Path> paths_;   // a stack: two for the ends, one a level of division
+  std::vector<float> table_;    // (rows_ + 1) x (2 columns_ + 1)
+  std::vector<Path> paths_;     // a stack: two for the ends, one a level of division
   std::size_t stack_size_ = 0;
 };
 

@@ -17,7 +17,7 @@ namespace view_servo
 struct Parameter
 {
   std::string name;
-  std::string type;     ///< "int", "double", "bool" or the allowed words, joined by '|'
+  std::string type;         ///< "int", "double", "bool" or the allowed words, joined by '|'
   std::string description;  ///< with unit and range
   std::function<std::string()> get;
   /** Parses and stores; false (and nothing stored) when the text is not of the type. */

@@ -38,10 +38,11 @@ struct ViewMatcherParams
   RansacParams ransac;
   ViewConsistency view_consistency = ViewConsistency::WITHIN;
   ViewConsistencyParams consistency;
-  bool guided = true;           ///< look for more matches along the geometry found
+  bool guided = true;  ///< look for more matches along the geometry found
   GuidedParams guidance;
-  double first_share = 0.6;     ///< part of the profiles that is searched for first, all only when it is not enough, (0, 1]
-  bool scale_search = true;     ///< try other scale ratios and coarser scales when the first finds no geometry
+  double first_share =
+      0.6;  ///< part of the profiles that is searched for first, all only when it is not enough, (0, 1]
+  bool scale_search = true;           ///< try other scale ratios and coarser scales when the first finds no geometry
   double min_log_significance = 6.0;  ///< -log10 of the number of false alarms that a geometry may have at most, >= 0
   std::uint64_t seed = 1;
 
@@ -73,16 +74,16 @@ struct StageTime
 struct ViewMatch
 {
   MatchOutcome outcome = MatchOutcome::NO_GEOMETRY;
-  std::string message;         ///< one line, for people
+  std::string message;  ///< one line, for people
   GeometryModel model = GeometryModel::HOMOGRAPHY;
-  Eigen::Matrix3d matrix;      ///< NaN unless MATCHED; H with H(2,2) = 1 where possible, F with norm 1
+  Eigen::Matrix3d matrix;             ///< NaN unless MATCHED; H with H(2,2) = 1 where possible, F with norm 1
   std::vector<MatchedPoint> matches;  ///< all candidates, best first
   int inliers = 0;
-  double rms_error = 0.0;      ///< of the inliers: transfer error in one image (H) or Sampson distance (F) [px]; NaN: none
+  double rms_error = 0.0;  ///< of the inliers: transfer error in one image (H) or Sampson distance (F) [px]; NaN: none
   double log_significance = 0.0;  ///< -log10 of the expected number of geometries this good among chance matches
-  int reference_level = 0;     ///< of PreparedImage, where the geometry was found
+  int reference_level = 0;        ///< of PreparedImage, where the geometry was found
   int current_level = 0;
-  RansacStatistics ransac;     ///< of the attempt that succeeded, else of the last
+  RansacStatistics ransac;  ///< of the attempt that succeeded, else of the last
   std::vector<StageTime> stages;
   double elapsed_ms = 0.0;
 };
