@@ -134,7 +134,7 @@ Eigen::Vector2d refinePeak(const cv::Mat& response, const Peak& peak)
   }
   const double huv = (r(1, 1) - r(1, -1) - r(-1, 1) + r(-1, -1)) / 4.0;
   const double det = huu * hvv - huv * huv;
-  const Eigen::Vector2d centre(peak.u, peak.v);
+  Eigen::Vector2d centre(peak.u, peak.v);
   if (huu >= 0.0 || det <= 0.0)
   {
     return centre;
@@ -187,6 +187,9 @@ std::vector<Corner> detectCorners(const cv::Mat& image, const CornerParams& para
   const int grid_cols = static_cast<int>(image.cols / cell) + 1;
   const int grid_rows = static_cast<int>(image.rows / cell) + 1;
   std::vector<std::vector<int>> grid(static_cast<std::size_t>(grid_cols) * static_cast<std::size_t>(grid_rows));
+  const auto cellIndex = [&](int u, int v) {
+    return static_cast<std::size_t>(v) * static_cast<std::size_t>(grid_cols) + static_cast<std::size_t>(u);
+  };
   const double min_squared = params.min_distance * params.min_distance;
   for (const Peak& peak : peaks)
   {
@@ -203,7 +206,7 @@ std::vector<Corner> detectCorners(const cv::Mat& image, const CornerParams& para
     {
       for (int gu = std::max(0, cu - 1); gu <= std::min(grid_cols - 1, cu + 1) && free; ++gu)
       {
-        for (const int other : grid[static_cast<std::size_t>(gv * grid_cols + gu)])
+        for (const int other : grid[cellIndex(gu, gv)])
         {
           if ((corners[static_cast<std::size_t>(other)].position - position).squaredNorm() < min_squared)
           {
@@ -215,7 +218,7 @@ std::vector<Corner> detectCorners(const cv::Mat& image, const CornerParams& para
     }
     if (free)
     {
-      grid[static_cast<std::size_t>(cv * grid_cols + cu)].push_back(static_cast<int>(corners.size()));
+      grid[cellIndex(cu, cv)].push_back(static_cast<int>(corners.size()));
       corners.push_back({ position, peak.response });
     }
   }

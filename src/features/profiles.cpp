@@ -30,22 +30,23 @@ int sampleCount(double length)
 class Basis
 {
 public:
-  Basis(int samples, int coefficients) : values_(static_cast<std::size_t>(samples * coefficients)), sums_{}
+  Basis(int samples, int coefficients) : coefficients_(static_cast<std::size_t>(coefficients)), sums_{}
   {
     for (int i = 0; i < samples; ++i)
     {
       for (int c = 0; c < coefficients; ++c)
       {
-        const double phase = M_PI * (c / 2 + 1) * (i + 0.5) / samples;
+        const int order = c / 2 + 1;
+        const double phase = M_PI * order * (i + 0.5) / samples;
         const double value = (c % 2 == 0 ? std::sin(phase) : std::cos(phase)) / samples;
-        values_[static_cast<std::size_t>(i * coefficients + c)] = static_cast<float>(value);
+        values_.push_back(static_cast<float>(value));
         sums_[c] += static_cast<float>(value);
       }
     }
   }
-  const float* row(int i, int coefficients) const
+  const float* row(int i) const
   {
-    return values_.data() + static_cast<std::size_t>(i * coefficients);
+    return values_.data() + static_cast<std::size_t>(i) * coefficients_;
   }
   float sum(int c) const
   {
@@ -53,6 +54,7 @@ public:
   }
 
 private:
+  std::size_t coefficients_;
   std::vector<float> values_;
   float sums_[MAX_COEFFICIENTS];
 };
@@ -93,7 +95,7 @@ bool describe(const cv::Mat& image, const Eigen::Vector2d& start, const Eigen::V
     const float intensity = upper + fy * (lower - upper);
     intensities[i] = intensity;
     total += intensity;
-    const float* b = basis.row(i, Coefficients);
+    const float* b = basis.row(i);
     for (int c = 0; c < Coefficients; ++c)
     {
       sums[c] += intensity * b[c];
@@ -255,9 +257,10 @@ ProfileSet extractProfiles(const cv::Mat& image, const std::vector<Corner>& corn
       const std::size_t k = static_cast<std::size_t>(i);
       const Eigen::Vector2d& start = corners[static_cast<std::size_t>(pairs[k].start)].position;
       const Eigen::Vector2d& end = corners[static_cast<std::size_t>(pairs[k].end)].position;
-      described[k] =
+      const bool good =
           inside(image, start) && inside(image, end) &&
           describe(image, start, end, params.coefficients, tables, params.min_contrast, features.data() + k * columns);
+      described[k] = good ? 1 : 0;
     }
   });
   for (std::size_t k = 0; k < pairs.size(); ++k)

@@ -35,7 +35,7 @@ float CyclicAligner::align(const float* weights, int rows, int columns)
     }
   }
   std::partial_sum(gains_.begin(), gains_.end(), gains_.begin());
-  table_.resize(static_cast<std::size_t>(rows + 1) * static_cast<std::size_t>(2 * columns + 1));
+  table_.resize((static_cast<std::size_t>(rows) + 1) * (2 * static_cast<std::size_t>(columns) + 1));
   std::size_t levels = 3;
   for (int n = columns; n > 1; n = (n + 1) / 2)
   {
@@ -86,7 +86,7 @@ void CyclicAligner::divide(const Rotation& left, const Rotation& right)
 
 float CyclicAligner::alignRotation(int rotation, const Path* left, const Path* right, Path& path)
 {
-  const std::size_t stride = static_cast<std::size_t>(2 * columns_ + 1);
+  const std::size_t stride = 2 * static_cast<std::size_t>(columns_) + 1;
   const auto low = [&](int row) {
     return left == nullptr ? rotation : std::max(rotation, left->first[static_cast<std::size_t>(row)]);
   };

@@ -19,6 +19,7 @@ namespace view_servo
  * is kept costs nothing for the next live image. Safe to use from several threads.
  *
  * Level l is the image reduced by 2^(l/2) on each side. Its features are in its own pixels; toFull() maps them.
+ * Asking for a level outside [0, LEVELS) throws std::out_of_range.
  */
 class PreparedImage
 {
@@ -42,12 +43,12 @@ public:
   }
 
   /** The reduced image; small ones (a side under 64 px) are empty, and so are their features. */
-  const cv::Mat& image(int level) const;
-  const PointFeatures& points(int level) const;
-  const ProfileIndex& profileIndex(int level) const;
+  const cv::Mat& image(int number) const;
+  const PointFeatures& points(int number) const;
+  const ProfileIndex& profileIndex(int number) const;
 
   /** Maps pixels of a level to pixels of the full image (homogeneous; a scale and a shift). */
-  Eigen::Matrix3d toFull(int level) const;
+  Eigen::Matrix3d toFull(int number) const;
 
 private:
   struct Level
