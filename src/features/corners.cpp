@@ -187,7 +187,7 @@ std::vector<Corner> detectCorners(const cv::Mat& image, const CornerParams& para
   const int grid_cols = static_cast<int>(image.cols / cell) + 1;
   const int grid_rows = static_cast<int>(image.rows / cell) + 1;
   std::vector<std::vector<int>> grid(static_cast<std::size_t>(grid_cols) * static_cast<std::size_t>(grid_rows));
-  const auto cellIndex = [&](int u, int v) {
+  const auto cell_index = [&](int u, int v) {
     return static_cast<std::size_t>(v) * static_cast<std::size_t>(grid_cols) + static_cast<std::size_t>(u);
   };
   const double min_squared = params.min_distance * params.min_distance;
@@ -206,7 +206,7 @@ std::vector<Corner> detectCorners(const cv::Mat& image, const CornerParams& para
     {
       for (int gu = std::max(0, cu - 1); gu <= std::min(grid_cols - 1, cu + 1) && free; ++gu)
       {
-        for (const int other : grid[cellIndex(gu, gv)])
+        for (const int other : grid[cell_index(gu, gv)])
         {
           if ((corners[static_cast<std::size_t>(other)].position - position).squaredNorm() < min_squared)
           {
@@ -218,7 +218,7 @@ std::vector<Corner> detectCorners(const cv::Mat& image, const CornerParams& para
     }
     if (free)
     {
-      grid[cellIndex(cu, cv)].push_back(static_cast<int>(corners.size()));
+      grid[cell_index(cu, cv)].push_back(static_cast<int>(corners.size()));
       corners.push_back({ position, peak.response });
     }
   }

@@ -131,7 +131,7 @@ double symmetricTransferError(const Eigen::Matrix3d& h, const Eigen::Matrix3d& h
 {
   const double error = squaredTransferError(h, pair.reference, pair.current) +
                        squaredTransferError(h_inverse, pair.current, pair.reference);
-  return error < INFINITE ? error : INFINITE;  // NaN to infinity
+  return std::isnan(error) ? INFINITE : error;
 }
 
 bool isHomographySample(const Correspondences& four, double min_height)

@@ -141,16 +141,16 @@ std::optional<Header> readHeader(std::istream& file)
 /** A JPEG without its end mark: libjpeg fills what is missing with grey and calls it a success. */
 bool isTruncatedJpeg(const Bytes& bytes)
 {
-  constexpr std::array<unsigned char, 3> start_mark{ 0xFF, 0xD8, 0xFF };
-  constexpr std::array<unsigned char, 2> scan_mark{ 0xFF, 0xDA };
-  constexpr std::array<unsigned char, 2> end_mark{ 0xFF, 0xD9 };
-  if (bytes.size() < start_mark.size() || !std::equal(start_mark.begin(), start_mark.end(), bytes.begin()))
+  constexpr std::array<unsigned char, 3> START_MARK{ 0xFF, 0xD8, 0xFF };
+  constexpr std::array<unsigned char, 2> SCAN_MARK{ 0xFF, 0xDA };
+  constexpr std::array<unsigned char, 2> END_MARK{ 0xFF, 0xD9 };
+  if (bytes.size() < START_MARK.size() || !std::equal(START_MARK.begin(), START_MARK.end(), bytes.begin()))
   {
     return false;
   }
   // The last scan starts after any thumbnail, which has an end mark of its own. 0xFF is escaped within a scan.
-  const auto scan = std::find_end(bytes.begin(), bytes.end(), scan_mark.begin(), scan_mark.end());
-  return std::search(scan, bytes.end(), end_mark.begin(), end_mark.end()) == bytes.end();
+  const auto scan = std::find_end(bytes.begin(), bytes.end(), SCAN_MARK.begin(), SCAN_MARK.end());
+  return std::search(scan, bytes.end(), END_MARK.begin(), END_MARK.end()) == bytes.end();
 }
 
 Bytes readFile(const std::string& path)
