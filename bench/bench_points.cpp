@@ -340,6 +340,7 @@ int tilt(const ViewMatcherParams& params)
 {
   ViewMatcherParams cyclic = params;
   cyclic.guided = false;
+  cyclic.first_share = 1.0;  // so that both look at the same profiles
   cyclic.points.cyclic_order = true;
   ViewMatcherParams votes = cyclic;
   votes.points.cyclic_order = false;

@@ -40,8 +40,13 @@ constexpr LevelPair OTHER_SCALES[] = { { 2, 2 }, { 2, 0 }, { 0, 2 }, { 4, 4 }, {
 struct Trial
 {
   LevelPair levels;
-  double share;  ///< of the profiles that are searched for
+  double share;             ///< of the profiles that are searched for
+  double min_significance;  ///< that a geometry must have to end the search
 };
+
+// A geometry from a share of the profiles ends the search only if it is beyond doubt, as most are; in the others the rest
+// of the profiles may find a better one.
+constexpr double BEYOND_DOUBT = 10.0;  // times the significance asked for
 
 std::vector<Trial> trials(const ViewMatcherParams& params)
 {
@@ -49,14 +54,14 @@ std::vector<Trial> trials(const ViewMatcherParams& params)
   std::vector<Trial> result;
   if (params.first_share < all)
   {
-    result.push_back({ { 0, 0 }, params.first_share });
+    result.push_back({ { 0, 0 }, params.first_share, BEYOND_DOUBT * params.min_log_significance });
   }
-  result.push_back({ { 0, 0 }, all });
+  result.push_back({ { 0, 0 }, all, params.min_log_significance });
   if (params.scale_search)
   {
     for (const LevelPair& levels : OTHER_SCALES)
     {
-      result.push_back({ levels, all });
+      result.push_back({ levels, all, params.min_log_significance });
     }
   }
   return result;
@@ -256,6 +261,7 @@ public:
     : reference_(reference),
       current_(current),
       levels_(trial.levels),
+      min_significance_(trial.min_significance),
       geometry_(geometry),
       params_(params),
       from_(reference.points(levels_.reference)),
@@ -311,7 +317,7 @@ public:
       inliers_.push_back(candidates_[static_cast<std::size_t>(i)]);
       supporting.push_back(pairs[static_cast<std::size_t>(i)]);
     }
-    if (result.log_significance < params_.min_log_significance || !keepsOrientation(supporting))
+    if (result.log_significance < min_significance_ || !keepsOrientation(supporting))
     {
       inliers_.clear();
       return false;
@@ -449,6 +455,7 @@ private:
   const PreparedImage& reference_;
   const PreparedImage& current_;
   const LevelPair levels_;
+  const double min_significance_;
   const Geometry& geometry_;
   ViewMatcherParams params_;
   const PointFeatures& from_;

@@ -41,7 +41,7 @@ struct ViewMatcherParams
   bool guided = true;  ///< look for more matches along the geometry found
   GuidedParams guidance;
   double first_share =
-      0.6;  ///< part of the profiles that is searched for first, all only when it is not enough, (0, 1]
+      0.6;  ///< part of the profiles that is searched for first; all, unless that leaves no doubt, (0, 1]
   bool scale_search = true;           ///< try other scale ratios and coarser scales when the first finds no geometry
   double min_log_significance = 6.0;  ///< -log10 of the number of false alarms that a geometry may have at most, >= 0
   std::uint64_t seed = 1;
