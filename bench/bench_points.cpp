@@ -469,11 +469,9 @@ int timing(const ViewMatcherParams& params, int runs)
   std::printf("reference stored      %7.1f  %.2f of SIFT\n", median(stored_ms), median(stored_ms) / sift);
   for (std::size_t i = 0; i < stages.front().size(); ++i)
   {
-    std::vector<double> ms;
-    for (const std::vector<StageTime>& run : stages)
-    {
-      ms.push_back(run[i].ms);
-    }
+    std::vector<double> ms(stages.size());
+    std::transform(stages.begin(), stages.end(), ms.begin(),
+                   [i](const std::vector<StageTime>& run) { return run[i].ms; });
     std::printf("  %-20s%7.1f\n", stages.front()[i].name.c_str(), median(ms));
   }
   return 0;
