@@ -2,6 +2,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "view_servo/views/view_matcher.h"
 
+#include "stage_clock.h"
+#include "view_servo/geometry/faults.h"
 #include "view_servo/geometry/fundamental.h"
 #include "view_servo/geometry/homography.h"
 #include "view_servo/robust/fundamental_estimator.h"
@@ -66,40 +68,6 @@ std::vector<Trial> trials(const ViewMatcherParams& params)
   }
   return result;
 }
-
-/** Adds the time since the last call, or since construction, to a stage. */
-class StageClock
-{
-public:
-  explicit StageClock(std::vector<StageTime>& stages) : stages_(stages), start_(Clock::now()), last_(start_)
-  {
-  }
-  void finish(const std::string& stage)
-  {
-    const Clock::time_point now = Clock::now();
-    const double ms = std::chrono::duration<double, std::milli>(now - last_).count();
-    last_ = now;
-    for (StageTime& known : stages_)
-    {
-      if (known.name == stage)
-      {
-        known.ms += ms;
-        return;
-      }
-    }
-    stages_.push_back({ stage, ms });
-  }
-  double total() const
-  {
-    return std::chrono::duration<double, std::milli>(Clock::now() - start_).count();
-  }
-
-private:
-  using Clock = std::chrono::steady_clock;
-  std::vector<StageTime>& stages_;
-  Clock::time_point start_;
-  Clock::time_point last_;
-};
 
 double log10Choose(double n, double k)
 {
@@ -489,16 +457,7 @@ std::vector<std::string> ViewMatcherParams::validate() const
 
 ViewMatcher::ViewMatcher(const ViewMatcherParams& params) : params_(params)
 {
-  const std::vector<std::string> faults = params.validate();
-  if (!faults.empty())
-  {
-    std::string all = "bad matching parameters:";
-    for (const std::string& fault : faults)
-    {
-      all += "\n  " + fault;
-    }
-    throw std::invalid_argument(all);
-  }
+  requireNoFaults("matching parameters", params.validate());
 }
 
 ViewMatch ViewMatcher::match(const PreparedImage& reference, const PreparedImage& current, GeometryModel model,

@@ -3,6 +3,7 @@
 #pragma once
 
 #include "view_servo/geometry/correspondence.h"
+#include "view_servo/geometry/line_segment.h"
 #include "view_servo/matching/guided_matching.h"
 #include "view_servo/matching/point_matcher.h"
 #include "view_servo/robust/ransac.h"
@@ -12,6 +13,7 @@
 #include <Eigen/Core>
 
 #include <cstdint>
+#include <limits>
 #include <string>
 #include <vector>
 
@@ -64,6 +66,17 @@ struct MatchedPoint
   bool inlier;
 };
 
+/** A line segment matched by LineViewMatcher. */
+struct MatchedLine
+{
+  Segment reference;  ///< pixels of the full images
+  Segment current;
+  int reference_index;  ///< among the segments of the image
+  int current_index;
+  double score;    ///< mean of common share and correlation, in [0, 1]
+  int plane = -1;  ///< index among the planes; -1 = none
+};
+
 struct StageTime
 {
   std::string name;
@@ -80,6 +93,10 @@ struct ViewMatch
   std::vector<MatchedPoint> matches;  ///< all candidates, best first
   int inliers = 0;
   double rms_error = 0.0;  ///< of the inliers: transfer error in one image (H) or Sampson distance (F) [px]; NaN: none
+  std::vector<MatchedLine> lines;       ///< of LineViewMatcher, best first
+  std::vector<Eigen::Matrix3d> planes;  ///< homographies of planes, of LineViewMatcher, most lines first
+  /** Of LineViewMatcher; NaN when not estimable. */
+  Eigen::Matrix3d fundamental = Eigen::Matrix3d::Constant(std::numeric_limits<double>::quiet_NaN());
   double log_significance = 0.0;  ///< -log10 of the expected number of geometries this good among chance matches
   int reference_level = 0;        ///< of PreparedImage, where the geometry was found
   int current_level = 0;

@@ -1,0 +1,41 @@
+// Copyright (c) 2026, the view_servo authors
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <Eigen/Core>
+#include <opencv2/core/mat.hpp>
+
+#include <string>
+#include <vector>
+
+namespace view_servo
+{
+/** Options of the edge detector (thesis 2.8.1; Canny 1986). */
+struct EdgeParams
+{
+  double sigma = 1.0;           ///< Gaussian derivative scale [px], [0.6, 20]
+  double low_threshold = 2.0;   ///< all pixels of a chain are at least as steep [grey levels/px], > 0
+  double high_threshold = 4.0;  ///< some pixel of a chain is at least as steep [grey levels/px], >= low_threshold
+  int min_points = 5;           ///< shorter chains are dropped, >= 2
+
+  /** All faults, one a line; empty when the parameters are usable. */
+  std::vector<std::string> validate() const;
+};
+
+/**
+ * Points of an edge one after the other, with the brighter side on the left of somebody who walks along them and looks
+ * at the image: sub-pixel positions [px], (0, 0) at the centre of the top-left pixel. The last point of a closed edge
+ * is its first.
+ */
+using EdgeChain = std::vector<Eigen::Vector2d>;
+
+/**
+ * The edges of an image. White noise of deviation s makes gradients of deviation s / (5 sigma^2) in u and in v, which
+ * the low threshold should exceed three times.
+ * @param grey 8-bit, one channel.
+ * @param region where edges are wanted: those of the whole image, cut off at its limits; empty = everywhere.
+ * @throws std::invalid_argument when the image has the wrong type.
+ */
+std::vector<EdgeChain> detectEdges(const cv::Mat& grey, const EdgeParams& params, const cv::Rect& region = cv::Rect());
+
+}  // namespace view_servo

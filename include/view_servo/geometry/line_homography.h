@@ -1,0 +1,53 @@
+// Copyright (c) 2026, the view_servo authors
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include "view_servo/geometry/line_segment.h"
+
+#include <Eigen/Core>
+
+#include <optional>
+#include <vector>
+
+namespace view_servo
+{
+/** @file
+ * Plane homographies and line segments. H maps the reference image to the current one, `x_cur ~ H x_ref`, and so lines
+ * by `l_ref ~ Hᵀ l_cur`. Of a segment its line is well known and its end points are not: errors are measured across.
+ */
+
+/** The same physical line seen in the two views; the segments have the same sense but may show different parts of it. */
+struct SegmentPair
+{
+  Segment reference;
+  Segment current;
+};
+
+using SegmentPairs = std::vector<SegmentPair>;
+
+/**
+ * Homography of n >= 4 lines (thesis 2.5): the one of least squared distances of the mapped reference end points from the
+ * current lines, each times the point's third coordinate, with isotropic normalisation. H has third coordinate 1 at the
+ * mean of the reference segments' midpoints. Empty when the lines do not determine it (four parallel, or concurrent).
+ */
+std::optional<Eigen::Matrix3d> homographyFromLines(const SegmentPairs& pairs);
+
+/** As homographyFromLines(), with an affine map: n >= 3 lines. */
+std::optional<Eigen::Matrix3d> affinityFromLines(const SegmentPairs& pairs);
+
+/** The segment that H makes of one. Empty where an end point maps to or beyond infinity (third coordinate < 0.1). */
+std::optional<Segment> transfer(const Eigen::Matrix3d& h, const Segment& segment);
+
+/** How two segments lie to each other. */
+struct SegmentAgreement
+{
+  double distance;  ///< largest distance between them, across, where they lie side by side [px]
+  double cosine;    ///< of the angle from the one to the other, in [-1, 1]
+  double overlap;   ///< length side by side over the length of the shorter, in [0, 1]
+  double share;     ///< length side by side over the length that both cover, in [0, 1]
+};
+
+/** Compares segments by what they share. Distance is infinite where they do not lie side by side. */
+SegmentAgreement compare(const Segment& a, const Segment& b);
+
+}  // namespace view_servo

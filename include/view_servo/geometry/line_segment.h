@@ -1,0 +1,48 @@
+// Copyright (c) 2026, the view_servo authors
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <Eigen/Core>
+
+#include <vector>
+
+namespace view_servo
+{
+/** A line segment in an image, from `start` to `end` [px]. */
+struct Segment
+{
+  Eigen::Vector2d start;
+  Eigen::Vector2d end;
+
+  /** [px] */
+  double length() const
+  {
+    return (end - start).norm();
+  }
+  Eigen::Vector2d midpoint() const
+  {
+    return 0.5 * (start + end);
+  }
+  /** Unit vector from start to end; NaN for a segment of no length. */
+  Eigen::Vector2d direction() const
+  {
+    return (end - start) / length();
+  }
+  /**
+   * Unit normal (direction turned by +90 degrees, which in an image with v down is clockwise): it points to the right
+   * of somebody who walks from start to end and looks at the image.
+   */
+  Eigen::Vector2d normal() const
+  {
+    const Eigen::Vector2d d = direction();
+    return { -d.y(), d.x() };
+  }
+  Segment reversed() const
+  {
+    return { end, start };
+  }
+};
+
+using Segments = std::vector<Segment>;
+
+}  // namespace view_servo

@@ -1,0 +1,121 @@
+// Copyright (c) 2026, the view_servo authors
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include "view_servo/geometry/line_segment.h"
+#include "view_servo/matching/line_groups.h"
+
+#include <Eigen/Core>
+#include <opencv2/core/mat.hpp>
+
+#include <array>
+#include <cstddef>
+#include <memory>
+#include <mutex>
+#include <string>
+#include <vector>
+
+namespace view_servo
+{
+/** Options of what line matching asks of each image. */
+struct LineFeatureParams
+{
+  LineGroupParams groups;
+  int max_grouped = 400;     ///< the longest segments form groups and seeds; all take part in growing, >= 1
+  int neighbours = 40;       ///< nearest segments of each that judge a hypothesis, >= 6
+  int neighbour_pairs = 15;  ///< nearest segments of each that make one, >= 2
+
+  /** All faults, one a line; empty when the parameters are usable. */
+  std::vector<std::string> validate() const;
+};
+
+/**
+ * The line segments of an image with all that matching asks of them: which lies near which, where their lines meet,
+ * what lies beside them, and their groups. Computed once for a stored view. Safe to use from several threads.
+ *
+ * Segments are kept longest first; input() says which one of those given it was. Memory is bounded by
+ * segments x neighbours, and the groups by max_grouped x neighbours² / 2.
+ */
+class LineFeatures
+{
+public:
+  /** A segment whose line meets that of another. */
+  struct Meeting
+  {
+    int other;
+    Eigen::Vector2d at;  ///< intersection of the two lines [px]
+  };
+
+  static constexpr double MIN_ANGLE = 0.2;  ///< between lines that meet [rad]
+
+  /**
+   * @param grey 8-bit, one channel.
+   * @param segments directed by their contrast, see directedByContrast().
+   * @throws std::invalid_argument for another type of image, naming the parameters' faults, or when a segment is not
+   * finite or has no length.
+   */
+  LineFeatures(const cv::Mat& grey, Segments segments, const LineFeatureParams& params);
+
+  const Segments& segments() const
+  {
+    return segments_;
+  }
+  const Segment& segment(int i) const
+  {
+    return segments_[static_cast<std::size_t>(i)];
+  }
+  /** Number of segments that form groups: the first so many. */
+  int groupedCount() const
+  {
+    return static_cast<int>(near_.size());
+  }
+  /** Index of a segment among those given. */
+  int input(int i) const
+  {
+    return input_[static_cast<std::size_t>(i)];
+  }
+  /** The image, smoothed by a Gaussian of 1.5 px. */
+  const cv::Mat& smoothed() const
+  {
+    return smoothed_;
+  }
+  /** The neighbours of a grouped segment, nearest first. */
+  const std::vector<int>& near(int i) const
+  {
+    return near_[static_cast<std::size_t>(i)];
+  }
+  /** The nearest whose lines meet that of a grouped segment within max_distance of both, nearest first. */
+  const std::vector<Meeting>& meetings(int i) const
+  {
+    return meetings_[static_cast<std::size_t>(i)];
+  }
+  /** The groups of the grouped segments; computed when first asked for. */
+  const LineIndex& index(LineGrouping groups) const;
+
+  static constexpr int DIRECTION_BINS = 36;
+  /** Which part of the circle a segment points to, [0, DIRECTION_BINS). */
+  static int directionBin(const Segment& segment);
+  /** All segments whose direction falls in a bin; bins are counted around the circle. */
+  const std::vector<int>& inDirection(int bin) const
+  {
+    return bins_[static_cast<std::size_t>((bin % DIRECTION_BINS + DIRECTION_BINS) % DIRECTION_BINS)];
+  }
+
+private:
+  struct Groups
+  {
+    std::once_flag once;
+    LineIndex index;
+  };
+
+  LineFeatureParams params_;
+  cv::Mat smoothed_;
+  Segments segments_;
+  std::vector<int> input_;
+  std::vector<std::vector<int>> near_;
+  std::vector<std::vector<Meeting>> meetings_;
+  std::array<std::vector<int>, DIRECTION_BINS> bins_;
+  std::unique_ptr<std::array<Groups, 2>> groups_;
+};
+
+}  // namespace view_servo

@@ -1,0 +1,126 @@
+// Copyright (c) 2026, the view_servo authors
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include "view_servo/geometry/line_segment.h"
+#include "view_servo/matching/association.h"
+
+#include <Eigen/Core>
+
+#include <array>
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <vector>
+
+namespace view_servo
+{
+/** @file
+ * Groups of line segments and their combinatorial structure (thesis 4.1-4.4; Carlsson 1996): on which side of one
+ * segment the end points of another lie. It does not change with the viewpoint as long as each point keeps its side, and
+ * never does for coplanar segments in front of the camera.
+ */
+
+enum class LineGrouping
+{
+  PAIRS,
+  TRIPLETS  ///< two pairs that share a segment
+};
+
+/** What tells a segment's start from its end, and the first segment of a pair from the second. */
+enum class LineOrder
+{
+  CONTRAST,  ///< start and end as given (brighter side left); a pair in the sense of rotation: free of roll
+  UPRIGHT    ///< thesis 4.1: a vertical segment, bottom to top, and a non-vertical one, left to right: no roll
+};
+
+/** Options of forming groups. */
+struct LineGroupParams
+{
+  LineGrouping groups = LineGrouping::TRIPLETS;
+  LineOrder order = LineOrder::CONTRAST;
+  double max_distance = 100.0;  ///< from each segment of a pair to the intersection of their lines [px], > 0
+  double collinearity = 2.0;    ///< a point this close to a segment's line counts as on it [px], >= 0
+  double min_angle_deg = 15.0;  ///< between the lines of a pair, (0, 90)
+  int max_neighbours = 15;      ///< pairs that a segment forms, the closest; 0 = no limit
+  double min_weight = 0.1;      ///< structures less likely than this are left out, [0, 1)
+
+  /** All faults, one a line; empty when the parameters are usable. */
+  std::vector<std::string> validate() const;
+};
+
+/** Number of pair indices: four signs, to base 3. */
+constexpr int PAIR_INDICES = 81;
+
+/**
+ * Structure of two segments (thesis eq. 4.1, 4.2): the signs of |a1 a2 b1|, |a1 a2 b2|, |b1 b2 a1|, |b1 b2 a2| as the
+ * digits of a number to base 3, in [0, 80]. (The thesis prints 81 as its upper end.) A sign is 0 where the point lies
+ * within `collinearity` [px] of the segment's line, which is the determinant over the segment's length.
+ */
+int pairIndex(const Segment& a, const Segment& b, double collinearity);
+
+/** Intersection of the lines through two segments; empty when they are parallel within `min_angle` [rad]. */
+std::optional<Eigen::Vector2d> lineIntersection(const Segment& a, const Segment& b, double min_angle);
+
+/** One of the structures that a pair may have had before its segments were broken up, and how likely it is. */
+struct PairHypothesis
+{
+  int index;
+  double weight;
+};
+
+/**
+ * The four structures of two segments of which neither, either or both may have reached their lines' intersection
+ * (thesis 4.2, fig. 4.6), in the order none, both, only a, only b; the weights sum to 1. An extended segment has its
+ * nearest end point on the intersection, so that this point's determinant is 0. `intersection` is that of the lines;
+ * without one (parallel lines) the first has weight 1.
+ */
+std::array<PairHypothesis, 4> pairHypotheses(const Segment& a, const Segment& b,
+                                             const std::optional<Eigen::Vector2d>& intersection, double collinearity);
+
+/** A pair (third segment -1) or a triplet, whose first segment is the shared one, with one of its structures. */
+struct LineGroup
+{
+  std::uint32_t key;            ///< equal keys: same structure; see tripletKey()
+  float weight;                 ///< of the structure, (0, 1]
+  std::array<int, 3> segments;  ///< indices, in the order that corresponds between views
+};
+
+/**
+ * Key of a triplet: ((p1 * 81 + p2) * 81 + p3) * classes + c. The thesis' eq. 4.3 adds the class c to the last index,
+ * which lets keys collide.
+ */
+std::uint32_t tripletKey(int p1, int p2, int p3, int c, int classes);
+
+/** @throws std::invalid_argument when a segment is not finite or has no length, naming it by its index. */
+void requireUsable(const Segments& segments);
+
+/** The groups of an image's segments, ordered by key. */
+class LineIndex
+{
+public:
+  LineIndex() = default;
+  /** @throws std::invalid_argument naming the parameters' faults, and as requireUsable(). */
+  LineIndex(const Segments& segments, const LineGroupParams& params);
+
+  const std::vector<LineGroup>& groups() const
+  {
+    return groups_;
+  }
+  int segmentCount() const
+  {
+    return segment_count_;
+  }
+
+private:
+  std::vector<LineGroup> groups_;
+  int segment_count_ = 0;
+};
+
+/**
+ * Votes (thesis 4.4): each group of the current image gives (w_i + w) / n to the association of every segment with its
+ * counterpart in each of the n reference groups with the same key.
+ */
+AssociationMatrix associateLines(const LineIndex& reference, const LineIndex& current);
+
+}  // namespace view_servo

@@ -1,0 +1,79 @@
+// Copyright (c) 2026, the view_servo authors
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include "view_servo/geometry/line_segment.h"
+#include "view_servo/matching/association.h"
+#include "view_servo/matching/line_features.h"
+
+#include <Eigen/Core>
+#include <opencv2/core/mat.hpp>
+
+#include <string>
+#include <vector>
+
+namespace view_servo
+{
+/** @file
+ * From votes to matches: parts of the image, each with one homography under which neighbouring segments fall on segments.
+ */
+
+/** Options of finding regions. */
+struct LineRegionParams
+{
+  int max_candidates = 8;         ///< counterparts tried for a segment, those with most votes, >= 1
+  int max_hypotheses = 12;        ///< affine maps scored for a candidate, those whose segments agree best, >= 1
+  double affine_tolerance = 3.0;  ///< of segments under a local affine map, across [px], > 0
+  double tolerance = 2.0;         ///< of segments under a homography, across [px], > 0
+  double max_angle_deg = 10.0;    ///< between a segment and its counterpart, (0, 45)
+  double min_support = 5.0;       ///< of a region: sum over its matches of 0.3 + 0.7 share, > 0
+  double min_correlation =
+      0.35;  ///< of the intensities beside a segment, on its better side, with its counterpart's, [-1, 1)
+  double min_mean_correlation = 0.55;  ///< of a region's matches, [-1, 1)
+
+  /** All faults, one a line; empty when the parameters are usable. */
+  std::vector<std::string> validate() const;
+};
+
+/** A segment and its counterpart, by their indices. */
+struct SegmentMatch
+{
+  int reference;
+  int current;
+  double share;              ///< of what the two cover that both show, in the current image, (0, 1]
+  double correlation = 0.0;  ///< of what lies beside them, [-1, 1]
+};
+
+/** Matches of neighbouring segments that agree with one homography. */
+struct LineRegion
+{
+  Eigen::Matrix3d h;  ///< reference -> current
+  std::vector<SegmentMatch> matches;
+  double support;  ///< sum over the matches of (0.3 + 0.7 share) x correlation
+};
+
+/**
+ * The one-to-one matches that agree with a homography among the reference segments `of` and all current ones: across
+ * within `tolerance` [px], within `max_angle_deg`, side by side for a third of the shorter. Best share first.
+ */
+std::vector<SegmentMatch> agreeingSegments(const Segments& reference, const std::vector<int>& of,
+                                           const LineFeatures& current, const Eigen::Matrix3d& h, double tolerance,
+                                           double max_angle_deg);
+
+/**
+ * Zero-mean normalised correlation of the intensities on one side of a segment, warped by a homography, with the current
+ * image: the larger of the two sides', since one may be background. In [-1, 1]; flat intensities give nearly 0.
+ */
+double sideCorrelation(const cv::Mat& reference, const cv::Mat& current, const Eigen::Matrix3d& h,
+                       const Segment& reference_segment, const Segment& current_segment);
+
+/**
+ * Regions, in the order they were found (strongest votes first). Each candidate match is tried with those neighbours
+ * that meet its segments alike: three lines give an affine map, the segments around say how good it is, and a map with
+ * enough support becomes a homography that grows outwards as long as segments agree. A segment that is in a region
+ * starts none. Time is bounded by the number of associations: seeds x max_candidates x max_hypotheses.
+ */
+std::vector<LineRegion> findLineRegions(const LineFeatures& reference, const LineFeatures& current,
+                                        const AssociationMatrix& association, const LineRegionParams& params);
+
+}  // namespace view_servo

@@ -1,0 +1,146 @@
+// Copyright (c) 2026, the view_servo authors
+// SPDX-License-Identifier: BSD-3-Clause
+#include "view_servo/matching/line_features.h"
+
+#include "view_servo/geometry/faults.h"
+
+#include <opencv2/core.hpp>
+#include <opencv2/imgproc.hpp>
+
+#include <algorithm>
+#include <cmath>
+#include <numeric>
+#include <stdexcept>
+#include <utility>
+
+namespace view_servo
+{
+namespace
+{
+double cross(const Eigen::Vector2d& a, const Eigen::Vector2d& b)
+{
+  return a.x() * b.y() - a.y() * b.x();
+}
+
+double distanceToPoint(const Segment& segment, const Eigen::Vector2d& point)
+{
+  const Eigen::Vector2d d = segment.end - segment.start;
+  const double along = std::clamp((point - segment.start).dot(d) / d.squaredNorm(), 0.0, 1.0);
+  return (point - segment.start - along * d).norm();
+}
+
+/** Distance between two segments [px], 0 when they cross. */
+double distanceBetween(const Segment& a, const Segment& b)
+{
+  const Eigen::Vector2d da = a.end - a.start;
+  const Eigen::Vector2d db = b.end - b.start;
+  if (cross(da, b.start - a.start) * cross(da, b.end - a.start) < 0.0 &&
+      cross(db, a.start - b.start) * cross(db, a.end - b.start) < 0.0)
+  {
+    return 0.0;
+  }
+  return std::min({ distanceToPoint(a, b.start), distanceToPoint(a, b.end), distanceToPoint(b, a.start),
+                    distanceToPoint(b, a.end) });
+}
+
+}  // namespace
+
+std::vector<std::string> LineFeatureParams::validate() const
+{
+  std::vector<std::string> faults = groups.validate();
+  if (max_grouped < 1 || max_grouped > 5000)
+  {
+    faults.emplace_back("max_grouped must lie in [1, 5000]");
+  }
+  if (neighbours < 6 || neighbours > 1000)
+  {
+    faults.emplace_back("neighbours must lie in [6, 1000]");
+  }
+  if (neighbour_pairs < 2 || neighbour_pairs > 100)
+  {
+    faults.emplace_back("neighbour_pairs must lie in [2, 100]");
+  }
+  return faults;
+}
+
+LineFeatures::LineFeatures(const cv::Mat& grey, Segments segments, const LineFeatureParams& params)
+  : params_(params), groups_(std::make_unique<std::array<Groups, 2>>())
+{
+  requireNoFaults("line parameters", params.validate());
+  if (grey.type() != CV_8UC1 || grey.empty())
+  {
+    throw std::invalid_argument("LineFeatures: the image must be 8-bit with one channel");
+  }
+  requireUsable(segments);
+  constexpr double SIGMA = 1.5;
+  cv::GaussianBlur(grey, smoothed_, cv::Size(), SIGMA);
+
+  input_.resize(segments.size());
+  std::iota(input_.begin(), input_.end(), 0);
+  std::stable_sort(input_.begin(), input_.end(), [&](int a, int b) {
+    return segments[static_cast<std::size_t>(a)].length() > segments[static_cast<std::size_t>(b)].length();
+  });
+  segments_.reserve(segments.size());
+  for (const int i : input_)
+  {
+    segments_.push_back(segments[static_cast<std::size_t>(i)]);
+  }
+
+  const int n = static_cast<int>(segments_.size());
+  for (int i = 0; i < n; ++i)
+  {
+    bins_[static_cast<std::size_t>(directionBin(segment(i)))].push_back(i);
+  }
+  const std::size_t count = static_cast<std::size_t>(std::min(n, params_.max_grouped));
+  near_.resize(count);
+  meetings_.resize(count);
+  const double max_distance = params_.groups.max_distance;
+  cv::parallel_for_(cv::Range(0, static_cast<int>(count)), [&](const cv::Range& range) {
+    std::vector<std::pair<double, int>> distances;
+    for (int i = range.start; i < range.end; ++i)
+    {
+      distances.clear();
+      for (int j = 0; j < n; ++j)
+      {
+        if (j != i)
+        {
+          distances.emplace_back(distanceBetween(segment(i), segment(j)), j);
+        }
+      }
+      const std::size_t kept = std::min(static_cast<std::size_t>(params_.neighbours), distances.size());
+      std::partial_sort(distances.begin(), distances.begin() + static_cast<std::ptrdiff_t>(kept), distances.end());
+      distances.resize(kept);
+      std::vector<Meeting>& meetings = meetings_[static_cast<std::size_t>(i)];
+      for (const auto& [distance, j] : distances)
+      {
+        near_[static_cast<std::size_t>(i)].push_back(j);
+        const auto at = lineIntersection(segment(i), segment(j), MIN_ANGLE);
+        if (at && static_cast<int>(meetings.size()) < params_.neighbour_pairs &&
+            distanceToPoint(segment(i), *at) < max_distance && distanceToPoint(segment(j), *at) < max_distance)
+        {
+          meetings.push_back({ j, *at });
+        }
+      }
+    }
+  });
+}
+
+const LineIndex& LineFeatures::index(LineGrouping groups) const
+{
+  Groups& wanted = (*groups_)[groups == LineGrouping::PAIRS ? 0 : 1];
+  std::call_once(wanted.once, [&] {
+    LineGroupParams params = params_.groups;
+    params.groups = groups;
+    wanted.index = LineIndex({ segments_.begin(), segments_.begin() + groupedCount() }, params);
+  });
+  return wanted.index;
+}
+
+int LineFeatures::directionBin(const Segment& segment)
+{
+  const Eigen::Vector2d d = segment.end - segment.start;
+  const double turns = std::atan2(d.y(), d.x()) / (2.0 * M_PI) + 0.5;
+  return static_cast<int>(turns * DIRECTION_BINS) % DIRECTION_BINS;
+}
+
+}  // namespace view_servo

@@ -1,0 +1,439 @@
+// Copyright (c) 2026, the view_servo authors
+// SPDX-License-Identifier: BSD-3-Clause
+#include "view_servo/matching/line_groups.h"
+
+#include "view_servo/geometry/faults.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+#include <stdexcept>
+#include <utility>
+
+namespace view_servo
+{
+namespace
+{
+double cross(const Eigen::Vector2d& a, const Eigen::Vector2d& b)
+{
+  return a.x() * b.y() - a.y() * b.x();
+}
+
+/** Signed distance of a point from the line through a segment [px]; positive on the side of normal(). */
+double side(const Segment& segment, const Eigen::Vector2d& point)
+{
+  return cross(segment.end - segment.start, point - segment.start) / segment.length();
+}
+
+int digit(double distance, double collinearity)
+{
+  return distance > collinearity ? 2 : (distance < -collinearity ? 0 : 1);
+}
+
+/** A segment whose nearest end point may have been moved to the intersection. */
+Segment extended(Segment segment, const Eigen::Vector2d& to)
+{
+  const bool start_is_nearer = (segment.start - to).squaredNorm() < (segment.end - to).squaredNorm();
+  (start_is_nearer ? segment.start : segment.end) = to;
+  return segment;
+}
+
+double distanceToNearestEnd(const Segment& segment, const Eigen::Vector2d& point)
+{
+  return std::min((segment.start - point).norm(), (segment.end - point).norm());
+}
+
+bool isVertical(const Segment& segment)
+{
+  const Eigen::Vector2d d = segment.end - segment.start;
+  return std::abs(d.y()) > std::abs(d.x());
+}
+
+/** A pair of neighbours: its segments in their order, where their lines meet, and its possible structures. */
+struct Pair
+{
+  int first;
+  int second;
+  Eigen::Vector2d intersection;
+  double distance;  ///< from the farther of the two segments to the intersection [px]
+  std::array<PairHypothesis, 4> hypotheses;
+
+  int other(int segment) const
+  {
+    return segment == first ? second : first;
+  }
+};
+
+class GroupBuilder
+{
+public:
+  GroupBuilder(const Segments& segments, const LineGroupParams& params) : segments_(segments), params_(params)
+  {
+    if (params_.order == LineOrder::UPRIGHT)
+    {
+      for (Segment& segment : segments_)
+      {
+        const Eigen::Vector2d d = segment.end - segment.start;
+        if (isVertical(segment) ? d.y() > 0.0 : d.x() < 0.0)
+        {
+          segment = segment.reversed();
+        }
+      }
+    }
+  }
+
+  std::vector<LineGroup> build()
+  {
+    findPairs();
+    if (params_.groups == LineGrouping::PAIRS)
+    {
+      for (const Pair& pair : pairs_)
+      {
+        addPair(pair);
+      }
+    }
+    else
+    {
+      addTriplets();
+    }
+    std::sort(groups_.begin(), groups_.end(), [](const LineGroup& a, const LineGroup& b) {
+      return a.key != b.key ? a.key < b.key : a.segments < b.segments;
+    });
+    return std::move(groups_);
+  }
+
+private:
+  const Segment& segment(int i) const
+  {
+    return segments_[static_cast<std::size_t>(i)];
+  }
+
+  /** The pair in its order, or empty when the two form none. */
+  std::optional<Pair> makePair(int i, int j) const
+  {
+    bool in_order = false;
+    if (params_.order == LineOrder::UPRIGHT)
+    {
+      if (isVertical(segment(i)) == isVertical(segment(j)))
+      {
+        return std::nullopt;
+      }
+      in_order = isVertical(segment(i));
+    }
+    else
+    {
+      in_order = cross(segment(i).end - segment(i).start, segment(j).end - segment(j).start) > 0.0;
+    }
+    const auto at = lineIntersection(segment(i), segment(j), params_.min_angle_deg * M_PI / 180.0);
+    if (!at)
+    {
+      return std::nullopt;
+    }
+    const double distance = std::max(reach(segment(i), *at), reach(segment(j), *at));
+    if (!(distance < params_.max_distance))
+    {
+      return std::nullopt;
+    }
+    return Pair{ in_order ? i : j, in_order ? j : i, *at, distance, {} };
+  }
+
+  /** Distance from a segment to an intersection: the thesis' from its nearest end point, else 0 within the segment. */
+  double reach(const Segment& segment, const Eigen::Vector2d& at) const
+  {
+    const Eigen::Vector2d d = segment.end - segment.start;
+    const double along = (at - segment.start).dot(d) / d.squaredNorm();
+    if (params_.order == LineOrder::CONTRAST && along >= 0.0 && along <= 1.0)
+    {
+      return 0.0;
+    }
+    return distanceToNearestEnd(segment, at);
+  }
+
+  void findPairs()
+  {
+    const int n = static_cast<int>(segments_.size());
+    std::vector<Pair> all;
+    for (int i = 0; i < n; ++i)
+    {
+      for (int j = i + 1; j < n; ++j)
+      {
+        const double apart = (segment(i).midpoint() - segment(j).midpoint()).norm();
+        if (apart > 0.5 * (segment(i).length() + segment(j).length()) + 2.0 * params_.max_distance)
+        {
+          continue;
+        }
+        if (auto pair = makePair(i, j))
+        {
+          all.push_back(*pair);
+        }
+      }
+    }
+    if (params_.max_neighbours > 0)
+    {
+      all = closest(all);
+    }
+    for (Pair& pair : all)
+    {
+      pair.hypotheses =
+          pairHypotheses(segment(pair.first), segment(pair.second), pair.intersection, params_.collinearity);
+    }
+    pairs_ = std::move(all);
+  }
+
+  /** The pairs that are among the closest of at least one of their segments. */
+  std::vector<Pair> closest(std::vector<Pair>& all) const
+  {
+    std::stable_sort(all.begin(), all.end(), [](const Pair& a, const Pair& b) { return a.distance < b.distance; });
+    std::vector<int> taken(segments_.size(), 0);
+    std::vector<Pair> kept;
+    for (const Pair& pair : all)
+    {
+      int& first = taken[static_cast<std::size_t>(pair.first)];
+      int& second = taken[static_cast<std::size_t>(pair.second)];
+      if (first < params_.max_neighbours && second < params_.max_neighbours)
+      {
+        ++first;
+        ++second;
+        kept.push_back(pair);
+      }
+    }
+    return kept;
+  }
+
+  void addPair(const Pair& pair)
+  {
+    for (const PairHypothesis& hypothesis : pair.hypotheses)
+    {
+      if (hypothesis.weight > params_.min_weight)
+      {
+        groups_.push_back({ static_cast<std::uint32_t>(hypothesis.index),
+                            static_cast<float>(hypothesis.weight),
+                            { pair.first, pair.second, -1 } });
+      }
+    }
+  }
+
+  void addTriplets()
+  {
+    std::vector<std::vector<const Pair*>> of_segment(segments_.size());
+    for (const Pair& pair : pairs_)
+    {
+      of_segment[static_cast<std::size_t>(pair.first)].push_back(&pair);
+      of_segment[static_cast<std::size_t>(pair.second)].push_back(&pair);
+    }
+    for (int shared = 0; shared < static_cast<int>(segments_.size()); ++shared)
+    {
+      const auto& neighbours = of_segment[static_cast<std::size_t>(shared)];
+      for (std::size_t j = 0; j < neighbours.size(); ++j)
+      {
+        for (std::size_t k = j + 1; k < neighbours.size(); ++k)
+        {
+          addTriplet(shared, *neighbours[j], *neighbours[k]);
+        }
+      }
+    }
+  }
+
+  void addTriplet(int shared, const Pair& a, const Pair& b)
+  {
+    const Segment& s = segment(shared);
+    const Pair* p = &a;
+    const Pair* q = &b;
+    int c = 0;
+    int classes = 0;
+    if (params_.order == LineOrder::UPRIGHT)
+    {
+      // Both others are of the other class: left to right for verticals, bottom to top else, by their midpoints.
+      const bool vertical = isVertical(s);
+      const Eigen::Vector2d ma = segment(a.other(shared)).midpoint();
+      const Eigen::Vector2d mb = segment(b.other(shared)).midpoint();
+      if (vertical ? ma.y() < mb.y() : ma.x() > mb.x())
+      {
+        std::swap(p, q);
+      }
+      c = vertical ? 1 : 0;
+      classes = 2;
+    }
+    else
+    {
+      // By their intersections along the shared segment.
+      const Eigen::Vector2d d = s.end - s.start;
+      if (d.dot(a.intersection) > d.dot(b.intersection))
+      {
+        std::swap(p, q);
+      }
+    }
+    const int j = p->other(shared);
+    const int k = q->other(shared);
+    int first = j;
+    int second = k;
+    if (params_.order == LineOrder::CONTRAST)
+    {
+      const bool turns = cross(segment(j).end - segment(j).start, segment(k).end - segment(k).start) > 0.0;
+      c = (p->first == shared ? 1 : 0) + (q->first == shared ? 2 : 0) + (turns ? 4 : 0);
+      classes = 8;
+      if (!turns)
+      {
+        std::swap(first, second);
+      }
+    }
+    const auto meeting = lineIntersection(segment(j), segment(k), params_.min_angle_deg * M_PI / 180.0);
+    const auto others = pairHypotheses(segment(first), segment(second), meeting, params_.collinearity);
+    for (const PairHypothesis& h1 : p->hypotheses)
+    {
+      for (const PairHypothesis& h2 : q->hypotheses)
+      {
+        const double both = h1.weight * h2.weight;
+        if (both <= params_.min_weight)
+        {
+          continue;
+        }
+        for (const PairHypothesis& h3 : others)
+        {
+          if (both * h3.weight > params_.min_weight)
+          {
+            groups_.push_back({ tripletKey(h1.index, h2.index, h3.index, c, classes),
+                                static_cast<float>(both * h3.weight),
+                                { shared, j, k } });
+          }
+        }
+      }
+    }
+  }
+
+  Segments segments_;
+  const LineGroupParams& params_;
+  std::vector<Pair> pairs_;
+  std::vector<LineGroup> groups_;
+};
+
+}  // namespace
+
+std::vector<std::string> LineGroupParams::validate() const
+{
+  std::vector<std::string> faults;
+  if (!(max_distance > 0.0))
+  {
+    faults.emplace_back("max_distance must be more than 0 px");
+  }
+  if (!(collinearity >= 0.0))
+  {
+    faults.emplace_back("collinearity must be at least 0 px");
+  }
+  if (!(min_angle_deg > 0.0 && min_angle_deg < 90.0))
+  {
+    faults.emplace_back("min_angle_deg must lie in (0, 90)");
+  }
+  if (max_neighbours < 0)
+  {
+    faults.emplace_back("max_neighbours must be at least 0");
+  }
+  if (!(min_weight >= 0.0 && min_weight < 1.0))
+  {
+    faults.emplace_back("min_weight must lie in [0, 1)");
+  }
+  return faults;
+}
+
+int pairIndex(const Segment& a, const Segment& b, double collinearity)
+{
+  return digit(side(a, b.start), collinearity) * 27 + digit(side(a, b.end), collinearity) * 9 +
+         digit(side(b, a.start), collinearity) * 3 + digit(side(b, a.end), collinearity);
+}
+
+std::optional<Eigen::Vector2d> lineIntersection(const Segment& a, const Segment& b, double min_angle)
+{
+  const Eigen::Vector2d da = a.end - a.start;
+  const Eigen::Vector2d db = b.end - b.start;
+  const double sine = cross(da, db);
+  if (!(std::abs(sine) > std::sin(min_angle) * da.norm() * db.norm()))
+  {
+    return std::nullopt;
+  }
+  return a.start + da * (cross(b.start - a.start, db) / sine);
+}
+
+std::array<PairHypothesis, 4> pairHypotheses(const Segment& a, const Segment& b,
+                                             const std::optional<Eigen::Vector2d>& intersection, double collinearity)
+{
+  const int as_detected = pairIndex(a, b, collinearity);
+  if (!intersection)
+  {
+    return { { { as_detected, 1.0 }, { as_detected, 0.0 }, { as_detected, 0.0 }, { as_detected, 0.0 } } };
+  }
+  const double wa = std::min(distanceToNearestEnd(a, *intersection) / a.length(), 1.0);
+  const double wb = std::min(distanceToNearestEnd(b, *intersection) / b.length(), 1.0);
+  const Segment longer_a = extended(a, *intersection);
+  const Segment longer_b = extended(b, *intersection);
+  return { { { as_detected, wa * wb },
+             { pairIndex(longer_a, longer_b, collinearity), (1.0 - wa) * (1.0 - wb) },
+             { pairIndex(longer_a, b, collinearity), (1.0 - wa) * wb },
+             { pairIndex(a, longer_b, collinearity), wa * (1.0 - wb) } } };
+}
+
+std::uint32_t tripletKey(int p1, int p2, int p3, int c, int classes)
+{
+  return static_cast<std::uint32_t>(((p1 * PAIR_INDICES + p2) * PAIR_INDICES + p3) * classes + c);
+}
+
+void requireUsable(const Segments& segments)
+{
+  for (std::size_t i = 0; i < segments.size(); ++i)
+  {
+    if (!segments[i].start.allFinite() || !segments[i].end.allFinite() || !(segments[i].length() > 0.0))
+    {
+      throw std::invalid_argument("line segment " + std::to_string(i) + " is not finite or has no length");
+    }
+  }
+}
+
+LineIndex::LineIndex(const Segments& segments, const LineGroupParams& params)
+  : segment_count_(static_cast<int>(segments.size()))
+{
+  requireNoFaults("line group parameters", params.validate());
+  requireUsable(segments);
+  groups_ = GroupBuilder(segments, params).build();
+}
+
+AssociationMatrix associateLines(const LineIndex& reference, const LineIndex& current)
+{
+  const std::size_t columns = static_cast<std::size_t>(current.segmentCount());
+  std::vector<float> votes(static_cast<std::size_t>(reference.segmentCount()) * columns, 0.0F);
+  const auto by_key = [](const LineGroup& a, const LineGroup& b) {
+    return a.key < b.key;
+  };
+  const std::vector<LineGroup>& stored = reference.groups();
+  const std::vector<LineGroup>& seen = current.groups();
+  auto from = stored.begin();
+  for (auto group = seen.begin(); group != seen.end();)
+  {
+    const auto [begin, end] = std::equal_range(from, stored.end(), *group, by_key);
+    from = end;
+    const auto last = std::upper_bound(group, seen.end(), *group, by_key);
+    const float share = begin == end ? 0.0F : 1.0F / static_cast<float>(end - begin);
+    for (; group != last; ++group)
+    {
+      for (auto other = begin; other != end; ++other)
+      {
+        const float vote = (group->weight + other->weight) * share;
+        for (std::size_t k = 0; k < 3 && group->segments[k] >= 0; ++k)
+        {
+          votes[static_cast<std::size_t>(other->segments[k]) * columns +
+                static_cast<std::size_t>(group->segments[k])] += vote;
+        }
+      }
+    }
+  }
+  std::vector<Association> entries;
+  for (std::size_t i = 0; i < votes.size(); ++i)
+  {
+    if (votes[i] > 0.0F)
+    {
+      entries.push_back(
+          { static_cast<int>(i / columns), static_cast<int>(i % columns), static_cast<double>(votes[i]) });
+    }
+  }
+  return { reference.segmentCount(), current.segmentCount(), std::move(entries) };
+}
+
+}  // namespace view_servo

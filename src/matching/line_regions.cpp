@@ -1,0 +1,686 @@
+// Copyright (c) 2026, the view_servo authors
+// SPDX-License-Identifier: BSD-3-Clause
+#include "view_servo/matching/line_regions.h"
+
+#include "view_servo/geometry/homography.h"
+#include "view_servo/geometry/line_homography.h"
+#include "view_servo/matching/line_groups.h"
+
+#include <Eigen/LU>
+#include <opencv2/core.hpp>
+
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+#include <limits>
+#include <optional>
+#include <utility>
+
+namespace view_servo
+{
+namespace
+{
+constexpr double MIN_OVERLAP = 0.35;       // of the shorter segment, for two to agree
+constexpr double MAX_SCALE_CHANGE = 5.0;   // of a local map
+constexpr double MAX_ANISOTROPY = 6.0;     // ratio of a local map's singular values, about
+constexpr std::size_t MIN_HOMOGRAPHY = 8;  // matches from which on a homography is fitted rather than an affine map
+constexpr int BATCH = 32;                  // candidates evaluated side by side; fixed, so that results are
+
+double cross(const Eigen::Vector2d& a, const Eigen::Vector2d& b)
+{
+  return a.x() * b.y() - a.y() * b.x();
+}
+
+double supportOf(double share)
+{
+  return 0.3 + 0.7 * share;
+}
+
+double support(const std::vector<SegmentMatch>& matches)
+{
+  double sum = 0.0;
+  for (const SegmentMatch& match : matches)
+  {
+    sum += supportOf(match.share);
+  }
+  return sum;
+}
+
+/** The share that a mapped segment has in common with one of the current image, 0 when they do not agree. */
+double agreement(const Segment& mapped, const Segment& current, double tolerance, double min_cosine)
+{
+  const SegmentAgreement found = compare(mapped, current);
+  return found.cosine >= min_cosine && found.overlap >= MIN_OVERLAP && found.distance <= tolerance ? found.share : 0.0;
+}
+
+bool boxesMeet(const Segment& a, const Segment& b, double margin)
+{
+  const auto apart = [margin](double a1, double a2, double b1, double b2) {
+    return std::max(a1, a2) + margin < std::min(b1, b2) || std::max(b1, b2) + margin < std::min(a1, a2);
+  };
+  return !apart(a.start.x(), a.end.x(), b.start.x(), b.end.x()) &&
+         !apart(a.start.y(), a.end.y(), b.start.y(), b.end.y());
+}
+
+/** Best first, each segment at most once. */
+std::vector<SegmentMatch> oneToOne(std::vector<SegmentMatch> matches, std::size_t references, std::size_t currents)
+{
+  std::stable_sort(matches.begin(), matches.end(),
+                   [](const SegmentMatch& a, const SegmentMatch& b) { return a.share > b.share; });
+  std::vector<char> reference_used(references, 0);
+  std::vector<char> current_used(currents, 0);
+  std::vector<SegmentMatch> kept;
+  for (const SegmentMatch& match : matches)
+  {
+    char& reference = reference_used[static_cast<std::size_t>(match.reference)];
+    char& current = current_used[static_cast<std::size_t>(match.current)];
+    if (reference == 0 && current == 0)
+    {
+      reference = current = 1;
+      kept.push_back(match);
+    }
+  }
+  return kept;
+}
+
+/** Least-squares affine map of n >= 3 points; empty when it is degenerate, mirrors, or distorts beyond the limits. */
+std::optional<Eigen::Matrix3d> plausibleAffinity(const Eigen::Vector2d* from, const Eigen::Vector2d* to,
+                                                 const double* weights, int n)
+{
+  Eigen::Vector2d mean_from = Eigen::Vector2d::Zero();
+  Eigen::Vector2d mean_to = Eigen::Vector2d::Zero();
+  double sum = 0.0;
+  for (int i = 0; i < n; ++i)
+  {
+    mean_from += weights[i] * from[i];
+    mean_to += weights[i] * to[i];
+    sum += weights[i];
+  }
+  mean_from /= sum;
+  mean_to /= sum;
+  Eigen::Matrix2d spread = Eigen::Matrix2d::Zero();
+  Eigen::Matrix2d mixed = Eigen::Matrix2d::Zero();
+  for (int i = 0; i < n; ++i)
+  {
+    spread += weights[i] * (from[i] - mean_from) * (from[i] - mean_from).transpose();
+    mixed += weights[i] * (to[i] - mean_to) * (from[i] - mean_from).transpose();
+  }
+  constexpr double FLAT = 1e-3;  // of the squared trace
+  if (!(spread.determinant() > FLAT * spread.trace() * spread.trace()))
+  {
+    return std::nullopt;
+  }
+  Eigen::Matrix3d map = Eigen::Matrix3d::Identity();
+  map.topLeftCorner<2, 2>() = mixed * spread.inverse();
+  map.topRightCorner<2, 1>() = mean_to - map.topLeftCorner<2, 2>() * mean_from;
+  const double determinant = map.topLeftCorner<2, 2>().determinant();
+  // (s1² + s2²) / (s1 s2), about s1 / s2 when they differ.
+  const double anisotropy = map.topLeftCorner<2, 2>().squaredNorm() / determinant;
+  if (!(determinant > 1.0 / (MAX_SCALE_CHANGE * MAX_SCALE_CHANGE) &&
+        determinant < MAX_SCALE_CHANGE * MAX_SCALE_CHANGE && anisotropy < MAX_ANISOTROPY))
+  {
+    return std::nullopt;
+  }
+  return map;
+}
+
+bool isInside(const cv::Mat& image, const Eigen::Vector2d& at)
+{
+  return at.x() >= 0.0 && at.y() >= 0.0 && at.x() < image.cols - 1.0 && at.y() < image.rows - 1.0;
+}
+
+double bilinear(const cv::Mat& image, const Eigen::Vector2d& at)
+{
+  const int u = static_cast<int>(at.x());
+  const int v = static_cast<int>(at.y());
+  const double fu = at.x() - u;
+  const double fv = at.y() - v;
+  const unsigned char* p = image.ptr<unsigned char>(v) + u;
+  const unsigned char* q = image.ptr<unsigned char>(v + 1) + u;
+  return (1.0 - fv) * ((1.0 - fu) * p[0] + fu * p[1]) + fv * ((1.0 - fu) * q[0] + fu * q[1]);
+}
+
+class RegionFinder
+{
+public:
+  RegionFinder(const LineFeatures& reference, const LineFeatures& current, const AssociationMatrix& association,
+               const LineRegionParams& params)
+    : from_(reference),
+      to_(current),
+      association_(association),
+      params_(params),
+      min_cosine_(std::cos(params.max_angle_deg * M_PI / 180.0))
+  {
+  }
+
+  std::vector<LineRegion> find() const
+  {
+    const std::vector<Association> candidates = rankedCandidates();
+    std::vector<char> claimed(from_.segments().size(), 0);
+    std::vector<LineRegion> regions;
+    for (std::size_t next = 0; next < candidates.size();)
+    {
+      std::vector<Association> batch;
+      for (; next < candidates.size() && batch.size() < BATCH; ++next)
+      {
+        if (claimed[static_cast<std::size_t>(candidates[next].row)] == 0)
+        {
+          batch.push_back(candidates[next]);
+        }
+      }
+      std::vector<std::optional<LineRegion>> seeds(batch.size());
+      cv::parallel_for_(cv::Range(0, static_cast<int>(batch.size())), [&](const cv::Range& range) {
+        for (int i = range.start; i < range.end; ++i)
+        {
+          seeds[static_cast<std::size_t>(i)] = seed(batch[static_cast<std::size_t>(i)]);
+        }
+      });
+      for (std::size_t i = 0; i < batch.size(); ++i)
+      {
+        if (!seeds[i] || claimed[static_cast<std::size_t>(batch[i].row)] != 0)
+        {
+          continue;
+        }
+        grow(*seeds[i]);
+        if (!looksAlike(*seeds[i]))
+        {
+          continue;
+        }
+        for (const SegmentMatch& match : seeds[i]->matches)
+        {
+          claimed[static_cast<std::size_t>(match.reference)] = 1;
+        }
+        regions.push_back(std::move(*seeds[i]));
+      }
+    }
+    return regions;
+  }
+
+private:
+  /** Candidate matches, those first that stand out in their row and column. */
+  std::vector<Association> rankedCandidates() const
+  {
+    std::vector<double> row_best(static_cast<std::size_t>(association_.rows()), 0.0);
+    std::vector<double> column_best(static_cast<std::size_t>(association_.columns()), 0.0);
+    for (const Association& entry : association_.entries())
+    {
+      double& row = row_best[static_cast<std::size_t>(entry.row)];
+      double& column = column_best[static_cast<std::size_t>(entry.column)];
+      row = std::max(row, entry.weight);
+      column = std::max(column, entry.weight);
+    }
+    constexpr double LOG_SHARE = 0.3;
+    std::vector<Association> ranked = association_.strongestOfRows(params_.max_candidates).entries();
+    for (Association& entry : ranked)
+    {
+      entry.weight = entry.weight / row_best[static_cast<std::size_t>(entry.row)] +
+                     entry.weight / column_best[static_cast<std::size_t>(entry.column)] +
+                     LOG_SHARE * std::log1p(entry.weight);
+    }
+    std::stable_sort(ranked.begin(), ranked.end(),
+                     [](const Association& a, const Association& b) { return a.weight > b.weight; });
+    return ranked;
+  }
+
+  const Segment& reference(int i) const
+  {
+    return from_.segments()[static_cast<std::size_t>(i)];
+  }
+  const Segment& current(int i) const
+  {
+    return to_.segments()[static_cast<std::size_t>(i)];
+  }
+
+  /** A neighbour that may correspond to a neighbour of the counterpart. */
+  struct Companion
+  {
+    int reference;
+    int current;
+    Eigen::Vector2d reference_at;
+    Eigen::Vector2d current_at;
+  };
+
+  std::vector<Companion> companions(int i, int k) const
+  {
+    constexpr double CLEARLY_ASIDE = 0.25;  // of its length, a midpoint from the line
+    const Eigen::Vector2d di = reference(i).direction();
+    const Eigen::Vector2d dk = current(k).direction();
+    std::vector<Companion> found;
+    for (const LineFeatures::Meeting& a : from_.meetings(i))
+    {
+      const Segment& ra = reference(a.other);
+      const double turn = cross(di, ra.end - ra.start);
+      const double aside = cross(di, ra.midpoint() - reference(i).start) / ra.length();
+      for (const LineFeatures::Meeting& b : to_.meetings(k))
+      {
+        const Segment& cb = current(b.other);
+        if (turn * cross(dk, cb.end - cb.start) < 0.0)
+        {
+          continue;
+        }
+        const double other_aside = cross(dk, cb.midpoint() - current(k).start) / cb.length();
+        if (aside * other_aside < 0.0 && std::abs(aside) > CLEARLY_ASIDE && std::abs(other_aside) > CLEARLY_ASIDE)
+        {
+          continue;
+        }
+        found.push_back({ a.other, b.other, a.at, b.at });
+      }
+    }
+    return found;
+  }
+
+  struct Hypothesis
+  {
+    double agreement;
+    Eigen::Matrix3d map;
+  };
+
+  /** The affine map of a candidate with two companions. */
+  std::optional<Hypothesis> hypothesis(const Association& candidate, const Companion& a, const Companion& b) const
+  {
+    constexpr double MIN_APART = 4.0;    // intersections along the shared segment [px]
+    constexpr double MAX_REACH = 400.0;  // of the third intersection [px]
+    constexpr double END_POINT_WEIGHT = 0.3;
+    constexpr double TURNS = 0.15;         // sine of an angle that has a clear sense
+    constexpr double SLACK = 1.5;          // of the tolerance, for the three segments themselves
+    constexpr double MIN_AGREEMENT = 0.8;  // sum of shares of the three
+    if (a.reference == b.reference || a.current == b.current)
+    {
+      return std::nullopt;
+    }
+    const Segment& ra = reference(a.reference);
+    const Segment& rb = reference(b.reference);
+    const Segment& ca = current(a.current);
+    const Segment& cb = current(b.current);
+    const double along = (b.reference_at - a.reference_at).dot(reference(candidate.row).direction());
+    const double along_current = (b.current_at - a.current_at).dot(current(candidate.column).direction());
+    const double scale = along_current / along;
+    if (std::abs(along) < MIN_APART || std::abs(along_current) < MIN_APART ||
+        !(scale > 1.0 / MAX_SCALE_CHANGE && scale < MAX_SCALE_CHANGE))
+    {
+      return std::nullopt;
+    }
+    const double turn = cross(ra.end - ra.start, rb.end - rb.start) / (ra.length() * rb.length());
+    const double turn_current = cross(ca.end - ca.start, cb.end - cb.start) / (ca.length() * cb.length());
+    if (turn * turn_current < 0.0 && std::abs(turn) > TURNS && std::abs(turn_current) > TURNS)
+    {
+      return std::nullopt;
+    }
+    // Two intersections, and the third or, where there is none, the far ends of the two others.
+    Eigen::Vector2d from[4] = { a.reference_at, b.reference_at };
+    Eigen::Vector2d to[4] = { a.current_at, b.current_at };
+    double weights[4] = { 1.0, 1.0, 1.0, END_POINT_WEIGHT };
+    int n = 3;
+    const auto third = lineIntersection(ra, rb, LineFeatures::MIN_ANGLE);
+    const auto third_current = lineIntersection(ca, cb, LineFeatures::MIN_ANGLE);
+    if (third && third_current && (*third - a.reference_at).norm() < MAX_REACH)
+    {
+      from[2] = *third;
+      to[2] = *third_current;
+    }
+    else
+    {
+      const bool a_starts = startIsFarther(ra, a.reference_at);
+      const bool b_starts = startIsFarther(rb, b.reference_at);
+      if (a_starts != startIsFarther(ca, a.current_at) || b_starts != startIsFarther(cb, b.current_at))
+      {
+        return std::nullopt;
+      }
+      from[2] = a_starts ? ra.start : ra.end;
+      to[2] = a_starts ? ca.start : ca.end;
+      from[3] = b_starts ? rb.start : rb.end;
+      to[3] = b_starts ? cb.start : cb.end;
+      weights[2] = END_POINT_WEIGHT;
+      n = 4;
+    }
+    const auto map = plausibleAffinity(from, to, weights, n);
+    if (!map)
+    {
+      return std::nullopt;
+    }
+    double sum = 0.0;
+    for (const auto& [i, k] : { std::pair(candidate.row, candidate.column), std::pair(a.reference, a.current),
+                                std::pair(b.reference, b.current) })
+    {
+      const double share = agreement(mapped(*map, i), current(k), SLACK * params_.affine_tolerance, min_cosine_);
+      if (share == 0.0)
+      {
+        return std::nullopt;
+      }
+      sum += share;
+    }
+    return sum >= MIN_AGREEMENT ? std::optional<Hypothesis>({ sum, *map }) : std::nullopt;
+  }
+
+  static bool startIsFarther(const Segment& segment, const Eigen::Vector2d& point)
+  {
+    return (segment.start - point).squaredNorm() > (segment.end - point).squaredNorm();
+  }
+
+  Segment mapped(const Eigen::Matrix3d& affinity, int i) const
+  {
+    const auto apply = [&](const Eigen::Vector2d& x) -> Eigen::Vector2d {
+      return affinity.topLeftCorner<2, 2>() * x + affinity.topRightCorner<2, 1>();
+    };
+    return { apply(reference(i).start), apply(reference(i).end) };
+  }
+
+  /** Support of an affine map among the neighbours of a candidate. */
+  double localSupport(const Association& candidate, const Eigen::Matrix3d& map) const
+  {
+    const std::vector<int>& near = to_.near(candidate.column);
+    std::vector<char> used(near.size(), 0);
+    double sum = 0.0;
+    for (const int i : from_.near(candidate.row))
+    {
+      const Segment at = mapped(map, i);
+      double best = 0.0;
+      std::size_t which = 0;
+      for (std::size_t k = 0; k < near.size(); ++k)
+      {
+        const Segment& other = current(near[k]);
+        if (used[k] == 0 && boxesMeet(at, other, params_.affine_tolerance))
+        {
+          const double share = agreement(at, other, params_.affine_tolerance, min_cosine_);
+          if (share > best)
+          {
+            best = share;
+            which = k;
+          }
+        }
+      }
+      if (best > 0.0)
+      {
+        used[which] = 1;
+        sum += supportOf(best);
+      }
+    }
+    return sum;
+  }
+
+  /** The best map of a candidate as a region of its neighbourhood; empty without enough support. */
+  std::optional<LineRegion> seed(const Association& candidate) const
+  {
+    std::vector<Hypothesis> hypotheses;
+    const std::vector<Companion> all = companions(candidate.row, candidate.column);
+    for (std::size_t a = 0; a < all.size(); ++a)
+    {
+      for (std::size_t b = a + 1; b < all.size(); ++b)
+      {
+        if (const auto found = hypothesis(candidate, all[a], all[b]))
+        {
+          hypotheses.push_back(*found);
+        }
+      }
+    }
+    std::stable_sort(hypotheses.begin(), hypotheses.end(),
+                     [](const Hypothesis& a, const Hypothesis& b) { return a.agreement > b.agreement; });
+    if (hypotheses.size() > static_cast<std::size_t>(params_.max_hypotheses))
+    {
+      hypotheses.resize(static_cast<std::size_t>(params_.max_hypotheses));
+    }
+    constexpr double WORTH_REFINING = 0.6;  // of the support asked for
+    double best = WORTH_REFINING * params_.min_support;
+    const Hypothesis* chosen = nullptr;
+    for (const Hypothesis& tried : hypotheses)
+    {
+      const double sum = localSupport(candidate, tried.map);
+      if (sum > best)
+      {
+        best = sum;
+        chosen = &tried;
+      }
+    }
+    if (chosen == nullptr)
+    {
+      return std::nullopt;
+    }
+    std::vector<int> near = from_.near(candidate.row);
+    near.push_back(candidate.row);
+    LineRegion region{ chosen->map, agreeing(near, chosen->map, params_.affine_tolerance), 0.0 };
+    for (int round = 0; round < 3; ++round)
+    {
+      if (!refit(region, near))
+      {
+        break;
+      }
+    }
+    return region.support >= params_.min_support && looksAlike(region) ? std::optional<LineRegion>(std::move(region))
+                                                                       : std::nullopt;
+  }
+
+  std::vector<SegmentMatch> agreeing(const std::vector<int>& of, const Eigen::Matrix3d& h, double tolerance) const
+  {
+    return agreeingSegments(from_.segments(), of, to_, h, tolerance, params_.max_angle_deg);
+  }
+
+  /** Fits a region's map to its matches and matches anew among `of`; false, and unchanged, when that gains nothing. */
+  bool refit(LineRegion& region, const std::vector<int>& of) const
+  {
+    SegmentPairs pairs;
+    for (const SegmentMatch& match : region.matches)
+    {
+      pairs.push_back({ reference(match.reference), current(match.current) });
+    }
+    const auto h = pairs.size() >= MIN_HOMOGRAPHY ? homographyFromLines(pairs) : affinityFromLines(pairs);
+    if (!h)
+    {
+      return false;
+    }
+    std::vector<SegmentMatch> matches = agreeing(of, *h, params_.tolerance);
+    const double sum = support(matches);
+    constexpr double GAIN = 0.2;
+    if (sum < region.support + GAIN)
+    {
+      return false;
+    }
+    region = { *h, std::move(matches), sum };
+    return true;
+  }
+
+  /** Lets a region take in what lies around it as long as it gains. */
+  void grow(LineRegion& region) const
+  {
+    constexpr int MAX_ROUNDS = 15;
+    constexpr double MARGIN = 0.3;       // of the region's extent
+    constexpr double MIN_MARGIN = 30.0;  // [px]
+    for (int round = 0; round < MAX_ROUNDS; ++round)
+    {
+      Eigen::Array2d low(std::numeric_limits<double>::infinity(), std::numeric_limits<double>::infinity());
+      Eigen::Array2d high = -low;
+      for (const SegmentMatch& match : region.matches)
+      {
+        for (const Eigen::Vector2d& end : { reference(match.reference).start, reference(match.reference).end })
+        {
+          low = low.min(end.array());
+          high = high.max(end.array());
+        }
+      }
+      const double margin = std::max(MIN_MARGIN, MARGIN * (high - low).maxCoeff());
+      std::vector<int> around;
+      for (int i = 0; i < static_cast<int>(from_.segments().size()); ++i)
+      {
+        const Eigen::Array2d at = reference(i).midpoint().array();
+        if ((at >= low - margin).all() && (at <= high + margin).all())
+        {
+          around.push_back(i);
+        }
+      }
+      if (!refit(region, around))
+      {
+        return;
+      }
+    }
+  }
+
+  /** Drops the matches whose surroundings differ; false when those of the whole region do. */
+  bool looksAlike(LineRegion& region) const
+  {
+    double sum = 0.0;
+    std::vector<SegmentMatch> kept;
+    for (SegmentMatch match : region.matches)
+    {
+      match.correlation = sideCorrelation(from_.smoothed(), to_.smoothed(), region.h, reference(match.reference),
+                                          current(match.current));
+      sum += match.correlation;
+      if (match.correlation >= params_.min_correlation)
+      {
+        kept.push_back(match);
+      }
+    }
+    const double mean = sum / static_cast<double>(region.matches.size());
+    region.matches = std::move(kept);
+    const bool enough = support(region.matches) >= params_.min_support;
+    region.support = 0.0;
+    for (const SegmentMatch& match : region.matches)
+    {
+      region.support += supportOf(match.share) * match.correlation;
+    }
+    return mean >= params_.min_mean_correlation && enough;
+  }
+
+  const LineFeatures& from_;
+  const LineFeatures& to_;
+  const AssociationMatrix& association_;
+  const LineRegionParams& params_;
+  double min_cosine_;
+};
+
+}  // namespace
+
+std::vector<std::string> LineRegionParams::validate() const
+{
+  std::vector<std::string> faults;
+  if (max_candidates < 1)
+  {
+    faults.emplace_back("max_candidates must be at least 1");
+  }
+  if (max_hypotheses < 1)
+  {
+    faults.emplace_back("max_hypotheses must be at least 1");
+  }
+  if (!(affine_tolerance > 0.0))
+  {
+    faults.emplace_back("affine_tolerance must be more than 0 px");
+  }
+  if (!(tolerance > 0.0))
+  {
+    faults.emplace_back("tolerance must be more than 0 px");
+  }
+  if (!(max_angle_deg > 0.0 && max_angle_deg < 45.0))
+  {
+    faults.emplace_back("max_angle_deg must lie in (0, 45)");
+  }
+  if (!(min_support > 0.0))
+  {
+    faults.emplace_back("min_support must be more than 0");
+  }
+  return faults;
+}
+
+std::vector<SegmentMatch> agreeingSegments(const Segments& reference, const std::vector<int>& of,
+                                           const LineFeatures& current, const Eigen::Matrix3d& h, double tolerance,
+                                           double max_angle_deg)
+{
+  const double min_cosine = std::cos(max_angle_deg * M_PI / 180.0);
+  const int reach = static_cast<int>(std::ceil(max_angle_deg * LineFeatures::DIRECTION_BINS / 360.0));
+  std::vector<SegmentMatch> found;
+  for (const int i : of)
+  {
+    const auto mapped = transfer(h, reference[static_cast<std::size_t>(i)]);
+    if (!mapped)
+    {
+      continue;
+    }
+    const int bin = LineFeatures::directionBin(*mapped);
+    for (int offset = -reach; offset <= reach; ++offset)
+    {
+      for (const int k : current.inDirection(bin + offset))
+      {
+        const Segment& other = current.segments()[static_cast<std::size_t>(k)];
+        if (boxesMeet(*mapped, other, tolerance))
+        {
+          const double share = agreement(*mapped, other, tolerance, min_cosine);
+          if (share > 0.0)
+          {
+            found.push_back({ i, k, share });
+          }
+        }
+      }
+    }
+  }
+  return oneToOne(std::move(found), reference.size(), current.segments().size());
+}
+
+double sideCorrelation(const cv::Mat& reference, const cv::Mat& current, const Eigen::Matrix3d& h,
+                       const Segment& reference_segment, const Segment& current_segment)
+{
+  constexpr int ALONG = 16;
+  constexpr int ACROSS = 6;
+  constexpr double FIRST = 1.0;    // distance of the samples from the segment [px]
+  constexpr double STEP = 1.5;     // [px]
+  constexpr int MIN_SAMPLES = 30;  // of a side, within both images
+  constexpr double NOISE = 4.0;    // variance of intensities that means nothing
+  const auto mapped = transfer(h, reference_segment);
+  if (!mapped)
+  {
+    return 0.0;
+  }
+  // The part that both show, as fractions of the reference segment; what a homography does to fractions is neglected.
+  const Eigen::Vector2d direction = current_segment.direction();
+  const double start = (mapped->start - current_segment.start).dot(direction);
+  const double end = (mapped->end - current_segment.start).dot(direction);
+  const double length = current_segment.length();
+  const double first = std::clamp((std::clamp(start, 0.0, length) - start) / (end - start), 0.0, 1.0);
+  const double last = std::clamp((std::clamp(end, 0.0, length) - start) / (end - start), 0.0, 1.0);
+
+  double best = -1.0;
+  for (const double side : { -1.0, 1.0 })
+  {
+    double sum_a = 0.0;
+    double sum_b = 0.0;
+    double sum_aa = 0.0;
+    double sum_bb = 0.0;
+    double sum_ab = 0.0;
+    int n = 0;
+    for (int i = 0; i < ALONG; ++i)
+    {
+      const double fraction = first + (last - first) * (i + 0.5) / ALONG;
+      const Eigen::Vector2d on_line =
+          reference_segment.start + fraction * (reference_segment.end - reference_segment.start);
+      for (int j = 0; j < ACROSS; ++j)
+      {
+        const Eigen::Vector2d at = on_line + side * (FIRST + STEP * j) * reference_segment.normal();
+        const Eigen::Vector2d there = transfer(h, at);
+        if (!isInside(reference, at) || !isInside(current, there))
+        {
+          continue;
+        }
+        const double a = bilinear(reference, at);
+        const double b = bilinear(current, there);
+        sum_a += a;
+        sum_b += b;
+        sum_aa += a * a;
+        sum_bb += b * b;
+        sum_ab += a * b;
+        ++n;
+      }
+    }
+    if (n >= MIN_SAMPLES)
+    {
+      const double variance_a = sum_aa / n - sum_a / n * (sum_a / n);
+      const double variance_b = sum_bb / n - sum_b / n * (sum_b / n);
+      const double covariance = sum_ab / n - sum_a / n * (sum_b / n);
+      best = std::max(best, covariance / std::sqrt((variance_a + NOISE) * (variance_b + NOISE)));
+    }
+  }
+  return best;
+}
+
+std::vector<LineRegion> findLineRegions(const LineFeatures& reference, const LineFeatures& current,
+                                        const AssociationMatrix& association, const LineRegionParams& params)
+{
+  return RegionFinder(reference, current, association, params).find();
+}
+
+}  // namespace view_servo

@@ -1,0 +1,506 @@
+// Copyright (c) 2026, the view_servo authors
+// SPDX-License-Identifier: BSD-3-Clause
+#include "view_servo/views/line_view_matcher.h"
+
+#include "stage_clock.h"
+#include "view_servo/geometry/faults.h"
+#include "view_servo/geometry/fundamental.h"
+#include "view_servo/geometry/homography.h"
+#include "view_servo/geometry/line_homography.h"
+#include "view_servo/robust/fundamental_estimator.h"
+#include "view_servo/robust/line_homography_estimator.h"
+
+#include <Eigen/Geometry>
+#include <Eigen/LU>
+
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+#include <limits>
+#include <optional>
+#include <stdexcept>
+#include <utility>
+
+namespace view_servo
+{
+namespace
+{
+constexpr double NOT_A_NUMBER = std::numeric_limits<double>::quiet_NaN();
+constexpr double HUBER_WIDTH = 0.5;  // of the final fits: residuals beyond count linearly [px]
+
+/** How sure a match is: the mean of what the segments share and of how alike their surroundings look. */
+double quality(const SegmentMatch& match)
+{
+  return 0.5 * (match.share + match.correlation);
+}
+
+Correspondences positions(const std::vector<MatchedPoint>& points)
+{
+  Correspondences pairs;
+  pairs.reserve(points.size());
+  for (const MatchedPoint& point : points)
+  {
+    pairs.push_back(point.position);
+  }
+  return pairs;
+}
+
+/** One match of two images. */
+class Attempt
+{
+public:
+  Attempt(const LineFeatures& reference, const LineFeatures& current, const LineMatcherParams& params)
+    : from_(reference), to_(current), params_(params), rng_(params.seed)
+  {
+  }
+
+  /** Regions of matches, none sharing a segment with another, best first. */
+  void findRegions(const AssociationMatrix& association)
+  {
+    std::vector<LineRegion> all = findLineRegions(from_, to_, association, params_.regions);
+    std::stable_sort(all.begin(), all.end(),
+                     [](const LineRegion& a, const LineRegion& b) { return a.support > b.support; });
+    std::vector<char> reference_used(from_.segments().size(), 0);
+    std::vector<char> current_used(to_.segments().size(), 0);
+    for (LineRegion& region : all)
+    {
+      std::vector<SegmentMatch> fresh;
+      for (const SegmentMatch& match : region.matches)
+      {
+        if (reference_used[static_cast<std::size_t>(match.reference)] == 0 &&
+            current_used[static_cast<std::size_t>(match.current)] == 0 && quality(match) >= params_.min_quality &&
+            !isBetterExplained(match))
+        {
+          fresh.push_back(match);
+        }
+      }
+      constexpr std::size_t MIN_FRESH = 4;
+      if (fresh.size() < MIN_FRESH)
+      {
+        continue;
+      }
+      for (const SegmentMatch& match : fresh)
+      {
+        reference_used[static_cast<std::size_t>(match.reference)] = 1;
+        current_used[static_cast<std::size_t>(match.current)] = 1;
+      }
+      region.matches = std::move(fresh);
+      regions_.push_back(std::move(region));
+    }
+  }
+
+  /**
+   * Epipolar geometry of all regions; those that disagree with it are dropped. Besides the intersections, each match
+   * gives the point that its region's homography sends its midpoint to: few lines meet, but all say where their region
+   * goes.
+   */
+  RansacStatistics dropInconsistentRegions()
+  {
+    Correspondences pairs = positions(junctions());
+    for (const LineRegion& region : regions_)
+    {
+      for (const SegmentMatch& match : region.matches)
+      {
+        pairs.push_back(midpoint(region, match));
+      }
+    }
+    RansacParams ransac_params = params_.ransac;
+    ransac_params.sampling = Sampling::UNIFORM;  // the best are all of one region, often a plane
+    const auto found = ransac(FundamentalEstimator(pairs, 0.0), ransac_params, rng_);
+    if (found.model)
+    {
+      const double limit = 2.0 * params_.ransac.inlier_threshold;
+      const auto disagrees = [&](const LineRegion& region) {
+        const auto agreeing =
+            std::count_if(region.matches.begin(), region.matches.end(), [&](const SegmentMatch& match) {
+              return sampsonError(*found.model, midpoint(region, match)) <= limit * limit;
+            });
+        return 2 * static_cast<std::size_t>(agreeing) <= region.matches.size();
+      };
+      regions_.erase(std::remove_if(regions_.begin(), regions_.end(), disagrees), regions_.end());
+    }
+    return found.statistics;
+  }
+
+  /** Intersections of neighbours that are matched in the same region, each once. */
+  std::vector<MatchedPoint> junctions() const
+  {
+    std::vector<MatchedPoint> found;
+    for (const LineRegion& region : regions_)
+    {
+      std::vector<const SegmentMatch*> of_reference(from_.segments().size(), nullptr);
+      for (const SegmentMatch& match : region.matches)
+      {
+        of_reference[static_cast<std::size_t>(match.reference)] = &match;
+      }
+      for (const SegmentMatch& match : region.matches)
+      {
+        if (match.reference >= from_.groupedCount())
+        {
+          continue;
+        }
+        for (const LineFeatures::Meeting& meeting : from_.meetings(match.reference))
+        {
+          const SegmentMatch* other = of_reference[static_cast<std::size_t>(meeting.other)];
+          if (other == nullptr || (meeting.other < match.reference && knows(meeting.other, match.reference)))
+          {
+            continue;
+          }
+          const auto at =
+              lineIntersection(to_.segment(match.current), to_.segment(other->current), LineFeatures::MIN_ANGLE);
+          if (at)
+          {
+            found.push_back({ { meeting.at, *at }, std::min(quality(match), quality(*other)), false });
+          }
+        }
+      }
+    }
+    return found;
+  }
+
+  /** All matches, best first. */
+  std::vector<SegmentMatch> matches() const
+  {
+    std::vector<SegmentMatch> all;
+    for (const LineRegion& region : regions_)
+    {
+      all.insert(all.end(), region.matches.begin(), region.matches.end());
+    }
+    std::stable_sort(all.begin(), all.end(),
+                     [](const SegmentMatch& a, const SegmentMatch& b) { return quality(a) > quality(b); });
+    return all;
+  }
+
+  const std::vector<LineRegion>& regions() const
+  {
+    return regions_;
+  }
+
+  Rng& rng()
+  {
+    return rng_;
+  }
+
+private:
+  Correspondence midpoint(const LineRegion& region, const SegmentMatch& match) const
+  {
+    const Eigen::Vector2d at = from_.segment(match.reference).midpoint();
+    return { at, transfer(region.h, at) };
+  }
+
+  /** Whether the homography of a better region finds what lies beside a segment at least as well, where it sends it. */
+  bool isBetterExplained(const SegmentMatch& match) const
+  {
+    const Segment& segment = from_.segment(match.reference);
+    return std::any_of(regions_.begin(), regions_.end(), [&](const LineRegion& region) {
+      const auto mapped = transfer(region.h, segment);
+      return mapped &&
+             sideCorrelation(from_.smoothed(), to_.smoothed(), region.h, segment, *mapped) >= match.correlation;
+    });
+  }
+
+  bool knows(int segment, int other) const
+  {
+    if (segment >= from_.groupedCount())
+    {
+      return false;
+    }
+    const std::vector<LineFeatures::Meeting>& meetings = from_.meetings(segment);
+    return std::any_of(meetings.begin(), meetings.end(),
+                       [other](const LineFeatures::Meeting& meeting) { return meeting.other == other; });
+  }
+
+  const LineFeatures& from_;
+  const LineFeatures& to_;
+  const LineMatcherParams& params_;
+  Rng rng_;
+  std::vector<LineRegion> regions_;
+};
+
+/** Homographies of planes, by RANSAC on what the former ones left (thesis 4.7.1), and which of them each line is on. */
+struct Planes
+{
+  std::vector<Eigen::Matrix3d> homographies;
+  std::vector<int> of_line;
+};
+
+Planes findPlanes(const SegmentPairs& lines, const LineMatcherParams& params, Rng& rng)
+{
+  Planes planes{ {}, std::vector<int>(lines.size(), -1) };
+  RansacParams ransac_params = params.ransac;
+  ransac_params.inlier_threshold = params.plane_threshold;
+  ransac_params.sampling = Sampling::UNIFORM;
+  std::vector<int> left(lines.size());
+  for (std::size_t i = 0; i < lines.size(); ++i)
+  {
+    left[i] = static_cast<int>(i);
+  }
+  while (static_cast<int>(planes.homographies.size()) < params.max_planes &&
+         static_cast<int>(left.size()) >= params.min_plane_lines)
+  {
+    SegmentPairs remaining;
+    for (const int i : left)
+    {
+      remaining.push_back(lines[static_cast<std::size_t>(i)]);
+    }
+    const auto found = ransac(LineHomographyEstimator(remaining), ransac_params, rng);
+    if (!found.model || static_cast<int>(found.inliers.size()) < params.min_plane_lines)
+    {
+      break;
+    }
+    for (const int i : found.inliers)
+    {
+      planes.of_line[static_cast<std::size_t>(left[static_cast<std::size_t>(i)])] =
+          static_cast<int>(planes.homographies.size());
+    }
+    planes.homographies.push_back(found.model->h);
+    left.erase(std::remove_if(left.begin(), left.end(),
+                              [&](int i) { return planes.of_line[static_cast<std::size_t>(i)] >= 0; }),
+               left.end());
+  }
+  return planes;
+}
+
+bool liesOnPlane(const Planes& planes, const Correspondence& point, double threshold)
+{
+  return std::any_of(planes.homographies.begin(), planes.homographies.end(), [&](const Eigen::Matrix3d& h) {
+    return 0.5 * symmetricTransferError(h, h.inverse(), point) <= threshold * threshold;
+  });
+}
+
+/** Whether nearly all of the points lie on one plane, which leaves F open. */
+bool isPlanar(const Correspondences& points, const Planes& planes, double threshold)
+{
+  constexpr std::size_t MIN_OFF_PLANE = 6;
+  return std::any_of(planes.homographies.begin(), planes.homographies.end(), [&](const Eigen::Matrix3d& h) {
+    const Eigen::Matrix3d inverse = h.inverse();
+    const auto off = std::count_if(points.begin(), points.end(), [&](const Correspondence& point) {
+      return 0.5 * symmetricTransferError(h, inverse, point) > threshold * threshold;
+    });
+    return static_cast<std::size_t>(off) < std::max(MIN_OFF_PLANE, points.size() / 20);
+  });
+}
+
+/** From the intersections; empty when they are too few or leave it open. */
+std::optional<Eigen::Matrix3d> fundamentalOfPoints(const Correspondences& points, const Planes& planes,
+                                                   const RansacParams& params, Rng& rng)
+{
+  constexpr std::size_t MIN_POINTS = 12;
+  if (points.size() < MIN_POINTS || isPlanar(points, planes, params.inlier_threshold))
+  {
+    return std::nullopt;
+  }
+  RansacParams ransac_params = params;
+  ransac_params.sampling = Sampling::UNIFORM;
+  const auto found = ransac(FundamentalEstimator(points, 0.0), ransac_params, rng);
+  if (!found.model || found.inliers.size() < MIN_POINTS)
+  {
+    return std::nullopt;
+  }
+  return refineFundamental(*found.model, select(points, found.inliers), HUBER_WIDTH);
+}
+
+/** From two planes: the points of their lines, each where its plane's homography sends it (thesis 4.7). */
+std::optional<Eigen::Matrix3d> fundamentalOfPlanes(const SegmentPairs& lines, const Planes& planes)
+{
+  if (planes.homographies.size() < 2)
+  {
+    return std::nullopt;
+  }
+  Correspondences sent;
+  for (std::size_t i = 0; i < lines.size(); ++i)
+  {
+    if (planes.of_line[i] == 0 || planes.of_line[i] == 1)
+    {
+      const Eigen::Matrix3d& h = planes.homographies[static_cast<std::size_t>(planes.of_line[i])];
+      for (const Eigen::Vector2d& end : { lines[i].reference.start, lines[i].reference.end })
+      {
+        sent.push_back({ end, transfer(h, end) });
+      }
+    }
+  }
+  const auto linear = fundamentalFromPoints(sent);
+  return linear ? std::optional<Eigen::Matrix3d>(refineFundamental(*linear, sent, HUBER_WIDTH)) : std::nullopt;
+}
+
+std::string plural(std::size_t count, const std::string& noun)
+{
+  return std::to_string(count) + " " + noun + (count == 1 ? "" : "s");
+}
+
+void reportPlane(const SegmentPairs& lines, const Planes& planes, ViewMatch& result)
+{
+  const LineHomographyEstimator estimator(lines);
+  const LineHomographyEstimator::Model model{ planes.homographies.front(), planes.homographies.front().inverse() };
+  double squares = 0.0;
+  for (std::size_t i = 0; i < lines.size(); ++i)
+  {
+    if (planes.of_line[i] == 0)
+    {
+      squares += estimator.error(model, i);
+      ++result.inliers;
+    }
+  }
+  result.outcome = MatchOutcome::MATCHED;
+  result.matrix = result.planes.front();
+  result.rms_error = std::sqrt(squares / result.inliers);
+  result.message = plural(lines.size(), "line") + " matched, " + std::to_string(result.inliers) +
+                   " of them on the first of " + plural(planes.homographies.size(), "plane");
+}
+
+void reportFundamental(ViewMatch& result)
+{
+  double squares = 0.0;
+  for (const MatchedPoint& point : result.matches)
+  {
+    if (point.inlier)
+    {
+      squares += sampsonError(result.fundamental, point.position);
+      ++result.inliers;
+    }
+  }
+  result.outcome = MatchOutcome::MATCHED;
+  result.matrix = result.fundamental;
+  result.rms_error = std::sqrt(squares / result.inliers);
+  result.message = plural(result.lines.size(), "line") + " matched, " + std::to_string(result.inliers) + " of " +
+                   plural(result.matches.size(), "intersection") + " agree with one fundamental matrix";
+}
+
+constexpr std::size_t MIN_SEGMENTS = 6;
+
+std::string whyNot(const LineFeatures& reference, const LineFeatures& current, const ViewMatch& result)
+{
+  if (result.outcome == MatchOutcome::TOO_FEW_FEATURES)
+  {
+    return "too few line segments: " + std::to_string(reference.segments().size()) + " in the reference, " +
+           std::to_string(current.segments().size()) + " in the current image, " + std::to_string(MIN_SEGMENTS) +
+           " needed in each";
+  }
+  if (result.lines.empty())
+  {
+    return "no geometry found: no part of the reference's segments falls on segments that look alike";
+  }
+  return "no geometry found: " + plural(result.lines.size(), "line") + " matched, which leave " +
+         (result.model == GeometryModel::HOMOGRAPHY ? "the homographies of planes" : "the fundamental matrix") +
+         " open";
+}
+
+}  // namespace
+
+LineMatcherParams::LineMatcherParams()
+{
+  // The end points of lines are uncertain, and so are intersections: 3 px tells regions apart.
+  ransac.inlier_threshold = 3.0;
+}
+
+std::vector<std::string> LineMatcherParams::validate() const
+{
+  std::vector<std::string> faults;
+  for (const std::vector<std::string>& more :
+       { segments.validate(), features.validate(), regions.validate(), ransac.validate() })
+  {
+    faults.insert(faults.end(), more.begin(), more.end());
+  }
+  if (!(plane_threshold > 0.0))
+  {
+    faults.emplace_back("plane_threshold must be more than 0 px");
+  }
+  if (min_plane_lines < 5)
+  {
+    faults.emplace_back("min_plane_lines must be at least 5");
+  }
+  if (max_planes < 1)
+  {
+    faults.emplace_back("max_planes must be at least 1");
+  }
+  if (!(min_quality >= 0.0 && min_quality < 1.0))
+  {
+    faults.emplace_back("min_quality must lie in [0, 1)");
+  }
+  return faults;
+}
+
+LineViewMatcher::LineViewMatcher(const LineMatcherParams& params) : params_(params)
+{
+  requireNoFaults("line matching parameters", params.validate());
+}
+
+ViewMatch LineViewMatcher::match(const LineFeatures& reference, const LineFeatures& current, GeometryModel model,
+                                 LineGrouping groups) const
+{
+  ViewMatch result;
+  result.model = model;
+  result.matrix.setConstant(NOT_A_NUMBER);
+  result.rms_error = NOT_A_NUMBER;
+  StageClock clock(result.stages);
+
+  Attempt attempt(reference, current, params_);
+  const LineIndex& reference_index = reference.index(groups);
+  clock.finish("reference");
+  const LineIndex& current_index = current.index(groups);
+  clock.finish("current");
+  const AssociationMatrix association = associateLines(reference_index, current_index);
+  clock.finish("association");
+  attempt.findRegions(association);
+  clock.finish("regions");
+  result.ransac = attempt.dropInconsistentRegions();
+  clock.finish("ransac");
+
+  SegmentPairs lines;
+  const std::vector<SegmentMatch> matches = attempt.matches();
+  for (const SegmentMatch& match : matches)
+  {
+    lines.push_back({ reference.segment(match.reference), current.segment(match.current) });
+  }
+  const Planes planes = findPlanes(lines, params_, attempt.rng());
+  for (std::size_t i = 0; i < lines.size(); ++i)
+  {
+    result.lines.push_back({ lines[i].reference, lines[i].current, reference.input(matches[i].reference),
+                             current.input(matches[i].current), quality(matches[i]), planes.of_line[i] });
+  }
+  for (const Eigen::Matrix3d& h : planes.homographies)
+  {
+    result.planes.push_back(normalizedHomography(h));
+  }
+  clock.finish("planes");
+
+  result.matches = attempt.junctions();
+  const Correspondences points = positions(result.matches);
+  const double threshold = params_.ransac.inlier_threshold;
+  auto f = fundamentalOfPoints(points, planes, params_.ransac, attempt.rng());
+  if (!f)
+  {
+    f = fundamentalOfPlanes(lines, planes);
+  }
+  if (f)
+  {
+    result.fundamental = *f;
+  }
+  for (MatchedPoint& point : result.matches)
+  {
+    point.inlier =
+        f ? sampsonError(*f, point.position) <= threshold * threshold : liesOnPlane(planes, point.position, threshold);
+  }
+  std::stable_sort(result.matches.begin(), result.matches.end(),
+                   [](const MatchedPoint& a, const MatchedPoint& b) { return a.score > b.score; });
+  clock.finish("fundamental");
+
+  if (model == GeometryModel::HOMOGRAPHY && !planes.homographies.empty())
+  {
+    reportPlane(lines, planes, result);
+  }
+  else if (model == GeometryModel::FUNDAMENTAL && f)
+  {
+    reportFundamental(result);
+  }
+  else
+  {
+    const std::size_t fewest = std::min(reference.segments().size(), current.segments().size());
+    result.outcome = fewest < MIN_SEGMENTS ? MatchOutcome::TOO_FEW_FEATURES : MatchOutcome::NO_GEOMETRY;
+    result.message = whyNot(reference, current, result);
+  }
+  result.elapsed_ms = clock.total();
+  return result;
+}
+
+}  // namespace view_servo
