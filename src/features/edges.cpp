@@ -188,12 +188,12 @@ private:
   }
 
   /**
-   * Of the edge pixels in the 3x3 block around (u, v) the nearest to `pixel` that lies along `ahead` from it and has
-   * nearly the same gradient direction; NONE if there is none.
+   * Of the edge pixels in the 3x3 block around (u, v) the nearest to `pixel` that lies more or less `ahead` of it and
+   * whose gradient has turned by less than 90 degrees; NONE if there is none.
    */
   int nearestIn(int u, int v, int pixel, const Eigen::Vector2f& ahead) const
   {
-    constexpr float COS_MAX_TURN = 0.5F;
+    constexpr float COS_MAX_ASIDE = 0.7F;
     const EdgePixel& here = pixels_[at(pixel)];
     int best = NONE;
     float best_squared = 0.0F;
@@ -211,8 +211,8 @@ private:
         const Eigen::Vector2f step = there.position - here.position;
         const float squared = step.squaredNorm();
         const float forward = ahead.dot(step);
-        if (forward > 0.0F && forward * forward >= COS_MAX_TURN * COS_MAX_TURN * squared &&
-            here.across.dot(there.across) >= COS_MAX_TURN && (best == NONE || squared < best_squared))
+        if (forward > 0.0F && forward * forward >= COS_MAX_ASIDE * COS_MAX_ASIDE * squared &&
+            here.across.dot(there.across) > 0.0F && (best == NONE || squared < best_squared))
         {
           best = candidate;
           best_squared = squared;

@@ -22,20 +22,51 @@ constexpr bool LSD_AVAILABLE = CV_VERSION_MAJOR * 10000 + CV_VERSION_MINOR * 100
 /** How far smoothing rounds an edge off at a corner, in multiples of its sigma. */
 constexpr double ROUNDING = 3.0;
 
-/** The points first..last of an edge. */
+struct Line
+{
+  Eigen::Vector2d point;
+  Eigen::Vector2d direction;  ///< unit vector
+
+  double distance(const Eigen::Vector2d& other) const
+  {
+    const Eigen::Vector2d offset = other - point;
+    return std::abs(direction.x() * offset.y() - direction.y() * offset.x());
+  }
+  Eigen::Vector2d projection(const Eigen::Vector2d& other) const
+  {
+    return point + direction.dot(other - point) * direction;
+  }
+};
+
+/** The points first..last of an edge and the line of total least squares, both without ends that are rounded off. */
 struct Section
 {
   std::size_t first;
   std::size_t last;
+  Line line;
+  double deviation;  ///< greatest distance of a point from the line [px]
 };
 
-/** Chooses the sections of an edge that are best seen as straight (Lowe 1987; Rosin and West 1989; thesis 2.8.2). */
+/**
+ * The straight sections of an edge: recursive subdivision at the point of greatest deviation from the chord, and on the
+ * way back up the parts instead of the whole if they are more significant (Lowe 1987; Rosin and West 1989; thesis
+ * 2.8.2). Deviations count from the line of total least squares, for a chord is as uncertain as its two end points.
+ */
 class Subdivision
 {
 public:
   Subdivision(const EdgeChain& edge, const LineSegmentParams& params) : edge_(edge), params_(params)
   {
-    divide({ 0, edge.size() - 1 });
+    sums_.reserve(edge.size() + 1);
+    sums_.emplace_back(Sums::Zero());
+    for (const Eigen::Vector2d& point : edge)
+    {
+      const Eigen::Vector2d p = point - edge.front();
+      Sums sums;
+      sums << p.x(), p.y(), p.x() * p.x(), p.x() * p.y(), p.y() * p.y();
+      sums_.emplace_back(sums_.back() + sums);
+    }
+    divide(0, edge.size() - 1);
   }
 
   const std::vector<Section>& sections() const
@@ -44,85 +75,81 @@ public:
   }
 
 private:
-  /** Adds the best sections of `whole`, and returns the significance of the most significant. */
-  double divide(const Section& whole)
+  /** Sums of u, v, u², uv and v² of the first points of the edge. */
+  using Sums = Eigen::Matrix<double, 5, 1>;
+
+  /** Total least squares on the points first..last. */
+  Line fit(std::size_t first, std::size_t last) const
   {
-    // Long sections are not divided near their ends, so that the depth of the recursion is bounded.
-    constexpr std::size_t LONG = 1000;
+    const Sums mean = (sums_[last + 1] - sums_[first]) / static_cast<double>(last + 1 - first);
+    const double uu = mean[2] - mean[0] * mean[0];
+    const double uv = mean[3] - mean[0] * mean[1];
+    const double vv = mean[4] - mean[1] * mean[1];
+    const double angle = 0.5 * std::atan2(2.0 * uv, uu - vv);
+    return { edge_.front() + mean.head<2>(), { std::cos(angle), std::sin(angle) } };
+  }
+
+  /** Adds the best sections of the points first..last, and returns the significance of the most significant. */
+  double divide(std::size_t first, std::size_t last)
+  {
     constexpr std::size_t SHORTEST = 4;
-    const std::size_t size = whole.last - whole.first;
-    const std::size_t margin = size > LONG ? size / 4 : 1;
-    const Eigen::Vector2d start = edge_[whole.first];
-    const Eigen::Vector2d chord = edge_[whole.last] - start;
+    const std::size_t size = last - first;
+    // The ends may be rounded off. Long sections are not divided near them, to bound the depth of the recursion.
+    constexpr std::size_t LONG = 1000;
+    const std::size_t rounded = std::min(size / 4, static_cast<std::size_t>(std::lround(params_.sigma)));
+    const std::size_t margin = size > LONG ? size / 4 : rounded;
+    const Line line = fit(first + rounded, last - rounded);
+    const Eigen::Vector2d chord = edge_[last] - edge_[first];
     const double length = chord.norm();
-    const Eigen::Vector2d normal = Eigen::Vector2d(-chord.y(), chord.x()) / length;
     double deviation = 0.0;
     double split_deviation = 0.0;
-    std::size_t split = whole.first + size / 2;
-    for (std::size_t i = whole.first; i <= whole.last; ++i)
+    std::size_t split = first + size / 2;
+    for (std::size_t i = first + rounded; i <= last - rounded; ++i)
     {
+      deviation = std::max(deviation, line.distance(edge_[i]));
+      const Eigen::Vector2d offset = edge_[i] - edge_[first];
       // The first and the last point of a closed edge are the same.
-      const double d = length > 0.0 ? std::abs(normal.dot(edge_[i] - start)) : (edge_[i] - start).norm();
-      deviation = std::max(deviation, d);
-      if (d > split_deviation && i >= whole.first + margin && i + margin <= whole.last)
+      const double from_chord =
+          length > 0.0 ? std::abs(chord.x() * offset.y() - chord.y() * offset.x()) : offset.norm();
+      if (from_chord > split_deviation && i >= first + margin && i <= last - margin)
       {
-        split_deviation = d;
+        split_deviation = from_chord;
         split = i;
       }
     }
-    const double significance = length / std::max(deviation, params_.min_deviation);
+    const double significance =
+        deviation <= params_.max_deviation ? length / std::max(deviation, params_.min_deviation) : 0.0;
     if (size > SHORTEST && deviation > params_.min_deviation)
     {
       const std::size_t mark = sections_.size();
-      const double left = divide({ whole.first, split });
-      const double right = divide({ split, whole.last });
+      const double left = divide(first, split);
+      const double right = divide(split, last);
       if (std::max(left, right) > significance)
       {
         return std::max(left, right);
       }
       sections_.resize(mark);
     }
-    sections_.push_back(whole);
+    sections_.push_back({ first, last, line, deviation });
     return significance;
   }
 
   const EdgeChain& edge_;
   const LineSegmentParams& params_;
+  std::vector<Sums> sums_;
   std::vector<Section> sections_;
 };
 
 /**
- * Total least squares on a section of an edge. The ends are the projections of the points where the edge leaves the
- * line, at or near the section's ends.
+ * The segment of a section. It ends at the projections of the points where the edge leaves the line, which are at or
+ * near the section's ends.
  */
-Segment fitSegment(const EdgeChain& edge, const Section& section, const LineSegmentParams& params)
+Segment segmentOf(const EdgeChain& edge, const Section& section, const LineSegmentParams& params)
 {
-  // The ends may be rounded off.
-  const std::size_t rounded =
-      std::min((section.last - section.first) / 4, static_cast<std::size_t>(std::lround(params.sigma)));
-  Eigen::Vector2d mean = Eigen::Vector2d::Zero();
-  for (std::size_t i = section.first + rounded; i <= section.last - rounded; ++i)
-  {
-    mean += edge[i];
-  }
-  mean /= static_cast<double>(section.last - section.first - 2 * rounded + 1);
-  double uu = 0.0;
-  double uv = 0.0;
-  double vv = 0.0;
-  for (std::size_t i = section.first + rounded; i <= section.last - rounded; ++i)
-  {
-    const Eigen::Vector2d offset = edge[i] - mean;
-    uu += offset.x() * offset.x();
-    uv += offset.x() * offset.y();
-    vv += offset.y() * offset.y();
-  }
-  const double angle = 0.5 * std::atan2(2.0 * uv, uu - vv);
-  const Eigen::Vector2d direction(std::cos(angle), std::sin(angle));
-  const auto on_line = [&](std::size_t i) {
-    const Eigen::Vector2d offset = edge[i] - mean;
-    return std::abs(direction.x() * offset.y() - direction.y() * offset.x()) < params.min_deviation;
-  };
   const std::size_t reach = static_cast<std::size_t>(std::lround(ROUNDING * params.sigma));
+  const auto on_line = [&](std::size_t i) {
+    return section.line.distance(edge[i]) < params.min_deviation;
+  };
   std::size_t first = section.first;
   while (first > 0 && section.first - first < reach && on_line(first - 1))
   {
@@ -133,10 +160,7 @@ Segment fitSegment(const EdgeChain& edge, const Section& section, const LineSegm
   {
     ++last;
   }
-  const auto project = [&](const Eigen::Vector2d& point) {
-    return Eigen::Vector2d(mean + direction.dot(point - mean) * direction);
-  };
-  return { project(edge[first]), project(edge[last]) };
+  return { section.line.projection(edge[first]), section.line.projection(edge[last]) };
 }
 
 /** Where the lines through two segments meet; not finite for parallel ones. */
@@ -153,14 +177,9 @@ Segments segmentsOf(const EdgeChain& edge, const LineSegmentParams& params)
   Segments segments;
   for (const Section& section : subdivision.sections())
   {
-    const Segment segment = fitSegment(edge, section, params);
-    const Eigen::Vector2d normal = segment.normal();
-    double deviation = params.min_deviation;
-    for (std::size_t i = section.first; i <= section.last; ++i)
-    {
-      deviation = std::max(deviation, std::abs(normal.dot(edge[i] - segment.start)));
-    }
-    if (segment.length() >= params.min_significance * deviation)
+    const Segment segment = segmentOf(edge, section, params);
+    if (section.deviation <= params.max_deviation &&
+        segment.length() >= params.min_significance * std::max(section.deviation, params.min_deviation))
     {
       segments.push_back(segment);
     }
@@ -262,16 +281,21 @@ std::vector<std::string> LineSegmentParams::validate() const
   edges.sigma = sigma;
   edges.low_threshold = low_threshold;
   edges.high_threshold = high_threshold;
-  std::vector<std::string> faults = edges.validate();
+  std::vector<std::string> faults;
+  for (const std::string& fault : edges.validate())
+  {
+    faults.push_back("edge_" + fault);
+  }
   const auto require = [&](bool good, const char* fault) {
     if (!good)
     {
       faults.emplace_back(fault);
     }
   };
-  require(min_deviation > 0.0, "min_deviation must be over 0 px");
-  require(min_significance >= 0.0, "min_significance must be at least 0");
-  require(min_length > 0.0 && min_length <= 10000.0, "min_length must lie in (0, 10000] px");
+  require(min_deviation > 0.0, "segment_deviation must be over 0 px");
+  require(max_deviation >= min_deviation, "segment_max_deviation must be at least segment_deviation");
+  require(min_significance >= 0.0, "segment_significance must be at least 0");
+  require(min_length > 0.0 && min_length <= 10000.0, "segment_min_length must lie in (0, 10000] px");
   require(max_segments >= 1, "max_segments must be at least 1");
   require(detector != SegmentDetector::LSD || LSD_AVAILABLE, "OpenCV " CV_VERSION " has no Line Segment Detector");
   return faults;

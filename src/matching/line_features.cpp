@@ -84,6 +84,7 @@ LineFeatures::LineFeatures(const cv::Mat& grey, Segments segments, const LineFea
   for (const int i : input_)
   {
     segments_.push_back(segments[static_cast<std::size_t>(i)]);
+    directions_.push_back(segments_.back().direction());
   }
 
   const int n = static_cast<int>(segments_.size());

@@ -314,23 +314,23 @@ std::vector<std::string> LineGroupParams::validate() const
   std::vector<std::string> faults;
   if (!(max_distance > 0.0))
   {
-    faults.emplace_back("max_distance must be more than 0 px");
+    faults.emplace_back("group_distance must be more than 0 px");
   }
   if (!(collinearity >= 0.0))
   {
-    faults.emplace_back("collinearity must be at least 0 px");
+    faults.emplace_back("group_collinearity must be at least 0 px");
   }
   if (!(min_angle_deg > 0.0 && min_angle_deg < 90.0))
   {
-    faults.emplace_back("min_angle_deg must lie in (0, 90)");
+    faults.emplace_back("group_min_angle_deg must lie in (0, 90)");
   }
   if (max_neighbours < 0)
   {
-    faults.emplace_back("max_neighbours must be at least 0");
+    faults.emplace_back("group_neighbours must be at least 0");
   }
   if (!(min_weight >= 0.0 && min_weight < 1.0))
   {
-    faults.emplace_back("min_weight must lie in [0, 1)");
+    faults.emplace_back("group_min_weight must lie in [0, 1)");
   }
   return faults;
 }

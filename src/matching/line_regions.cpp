@@ -46,21 +46,43 @@ double support(const std::vector<SegmentMatch>& matches)
   return sum;
 }
 
-/** The share that a mapped segment has in common with one of the current image, 0 when they do not agree. */
-double agreement(const Segment& mapped, const Segment& current, double tolerance, double min_cosine)
+/** A segment in the current image that others are compared with, most of which are soon told not to agree. */
+class Probe
 {
-  const SegmentAgreement found = compare(mapped, current);
-  return found.cosine >= min_cosine && found.overlap >= MIN_OVERLAP && found.distance <= tolerance ? found.share : 0.0;
-}
+public:
+  Probe(const Segment& segment, double tolerance, double min_cosine)
+    : segment_(segment),
+      tolerance_(tolerance),
+      min_cosine_(min_cosine),
+      along_(segment.end - segment.start),
+      least_(min_cosine * along_.norm()),
+      low_(segment.start.array().min(segment.end.array()) - tolerance),
+      high_(segment.start.array().max(segment.end.array()) + tolerance)
+  {
+  }
 
-bool boxesMeet(const Segment& a, const Segment& b, double margin)
-{
-  const auto apart = [margin](double a1, double a2, double b1, double b2) {
-    return std::max(a1, a2) + margin < std::min(b1, b2) || std::max(b1, b2) + margin < std::min(a1, a2);
-  };
-  return !apart(a.start.x(), a.end.x(), b.start.x(), b.end.x()) &&
-         !apart(a.start.y(), a.end.y(), b.start.y(), b.end.y());
-}
+  /** The share that both have in common, 0 when they do not agree. @param direction of the other, a unit vector. */
+  double agreement(const Segment& other, const Eigen::Vector2d& direction) const
+  {
+    if (along_.dot(direction) < least_ || (other.start.array().max(other.end.array()) < low_).any() ||
+        (other.start.array().min(other.end.array()) > high_).any())
+    {
+      return 0.0;
+    }
+    const SegmentAgreement found = compare(segment_, other);
+    return found.cosine >= min_cosine_ && found.overlap >= MIN_OVERLAP && found.distance <= tolerance_ ? found.share
+                                                                                                       : 0.0;
+  }
+
+private:
+  const Segment segment_;
+  const double tolerance_;
+  const double min_cosine_;
+  const Eigen::Vector2d along_;
+  const double least_;  // component of along_ in the direction of one that agrees
+  const Eigen::Array2d low_;
+  const Eigen::Array2d high_;
+};
 
 /** Best first, each segment at most once. */
 std::vector<SegmentMatch> oneToOne(std::vector<SegmentMatch> matches, std::size_t references, std::size_t currents)
@@ -149,8 +171,17 @@ public:
       to_(current),
       association_(association),
       params_(params),
-      min_cosine_(std::cos(params.max_angle_deg * M_PI / 180.0))
+      min_cosine_(std::cos(params.max_angle_deg * M_PI / 180.0)),
+      row_best_(static_cast<std::size_t>(association.rows()), 0.0),
+      column_best_(static_cast<std::size_t>(association.columns()), 0.0)
   {
+    for (const Association& entry : association.entries())
+    {
+      double& row = row_best_[static_cast<std::size_t>(entry.row)];
+      double& column = column_best_[static_cast<std::size_t>(entry.column)];
+      row = std::max(row, entry.weight);
+      column = std::max(column, entry.weight);
+    }
   }
 
   std::vector<LineRegion> find() const
@@ -200,21 +231,12 @@ private:
   /** Candidate matches, those first that stand out in their row and column. */
   std::vector<Association> rankedCandidates() const
   {
-    std::vector<double> row_best(static_cast<std::size_t>(association_.rows()), 0.0);
-    std::vector<double> column_best(static_cast<std::size_t>(association_.columns()), 0.0);
-    for (const Association& entry : association_.entries())
-    {
-      double& row = row_best[static_cast<std::size_t>(entry.row)];
-      double& column = column_best[static_cast<std::size_t>(entry.column)];
-      row = std::max(row, entry.weight);
-      column = std::max(column, entry.weight);
-    }
     constexpr double LOG_SHARE = 0.3;
     std::vector<Association> ranked = association_.strongestOfRows(params_.max_candidates).entries();
     for (Association& entry : ranked)
     {
-      entry.weight = entry.weight / row_best[static_cast<std::size_t>(entry.row)] +
-                     entry.weight / column_best[static_cast<std::size_t>(entry.column)] +
+      entry.weight = entry.weight / row_best_[static_cast<std::size_t>(entry.row)] +
+                     entry.weight / column_best_[static_cast<std::size_t>(entry.column)] +
                      LOG_SHARE * std::log1p(entry.weight);
     }
     std::stable_sort(ranked.begin(), ranked.end(),
@@ -238,13 +260,17 @@ private:
     int current;
     Eigen::Vector2d reference_at;
     Eigen::Vector2d current_at;
+    double along;  ///< place of the intersection on the shared segment [px]
+    double current_along;
+    double weight;  ///< of their association
   };
 
+  /** Those that meet the candidate's segments in the same sense and on the same side, strongest votes first. */
   std::vector<Companion> companions(int i, int k) const
   {
     constexpr double CLEARLY_ASIDE = 0.25;  // of its length, a midpoint from the line
-    const Eigen::Vector2d di = reference(i).direction();
-    const Eigen::Vector2d dk = current(k).direction();
+    const Eigen::Vector2d& di = from_.direction(i);
+    const Eigen::Vector2d& dk = to_.direction(k);
     std::vector<Companion> found;
     for (const LineFeatures::Meeting& a : from_.meetings(i))
     {
@@ -263,10 +289,36 @@ private:
         {
           continue;
         }
-        found.push_back({ a.other, b.other, a.at, b.at });
+        const double weight = votesOf(a.other, b.other);
+        if (weight > 0.0)
+        {
+          found.push_back({ a.other, b.other, a.at, b.at, a.at.dot(di), b.at.dot(dk), weight });
+        }
       }
     }
+    const std::size_t kept = std::min(found.size(), static_cast<std::size_t>(params_.max_companions));
+    std::partial_sort(found.begin(), found.begin() + static_cast<std::ptrdiff_t>(kept), found.end(),
+                      [](const Companion& a, const Companion& b) {
+                        return a.weight != b.weight
+                                   ? a.weight > b.weight
+                                   : std::pair(a.reference, a.current) < std::pair(b.reference, b.current);
+                      });
+    found.resize(kept);
     return found;
+  }
+
+  /** Votes as a part of the most that either has; neighbours that form no groups have none, and count a little. */
+  double votesOf(int i, int k) const
+  {
+    if (i >= association_.rows() || k >= association_.columns())
+    {
+      constexpr double UNKNOWN = 1e-3;
+      return UNKNOWN;
+    }
+    const double weight = association_.weight(i, k);
+    return weight > 0.0
+               ? weight / row_best_[static_cast<std::size_t>(i)] + weight / column_best_[static_cast<std::size_t>(k)]
+               : 0.0;
   }
 
   struct Hypothesis
@@ -292,8 +344,8 @@ private:
     const Segment& rb = reference(b.reference);
     const Segment& ca = current(a.current);
     const Segment& cb = current(b.current);
-    const double along = (b.reference_at - a.reference_at).dot(reference(candidate.row).direction());
-    const double along_current = (b.current_at - a.current_at).dot(current(candidate.column).direction());
+    const double along = b.along - a.along;
+    const double along_current = b.current_along - a.current_along;
     const double scale = along_current / along;
     if (std::abs(along) < MIN_APART || std::abs(along_current) < MIN_APART ||
         !(scale > 1.0 / MAX_SCALE_CHANGE && scale < MAX_SCALE_CHANGE))
@@ -342,7 +394,8 @@ private:
     for (const auto& [i, k] : { std::pair(candidate.row, candidate.column), std::pair(a.reference, a.current),
                                 std::pair(b.reference, b.current) })
     {
-      const double share = agreement(mapped(*map, i), current(k), SLACK * params_.affine_tolerance, min_cosine_);
+      const double share =
+          Probe(mapped(*map, i), SLACK * params_.affine_tolerance, min_cosine_).agreement(current(k), to_.direction(k));
       if (share == 0.0)
       {
         return std::nullopt;
@@ -373,20 +426,16 @@ private:
     double sum = 0.0;
     for (const int i : from_.near(candidate.row))
     {
-      const Segment at = mapped(map, i);
+      const Probe probe(mapped(map, i), params_.affine_tolerance, min_cosine_);
       double best = 0.0;
       std::size_t which = 0;
       for (std::size_t k = 0; k < near.size(); ++k)
       {
-        const Segment& other = current(near[k]);
-        if (used[k] == 0 && boxesMeet(at, other, params_.affine_tolerance))
+        const double share = used[k] == 0 ? probe.agreement(current(near[k]), to_.direction(near[k])) : 0.0;
+        if (share > best)
         {
-          const double share = agreement(at, other, params_.affine_tolerance, min_cosine_);
-          if (share > best)
-          {
-            best = share;
-            which = k;
-          }
+          best = share;
+          which = k;
         }
       }
       if (best > 0.0)
@@ -544,6 +593,8 @@ private:
   const AssociationMatrix& association_;
   const LineRegionParams& params_;
   double min_cosine_;
+  std::vector<double> row_best_;     // largest weight of each row of the association
+  std::vector<double> column_best_;  // and of each column
 };
 
 }  // namespace
@@ -555,6 +606,10 @@ std::vector<std::string> LineRegionParams::validate() const
   {
     faults.emplace_back("max_candidates must be at least 1");
   }
+  if (max_companions < 2)
+  {
+    faults.emplace_back("max_companions must be at least 2");
+  }
   if (max_hypotheses < 1)
   {
     faults.emplace_back("max_hypotheses must be at least 1");
@@ -565,15 +620,23 @@ std::vector<std::string> LineRegionParams::validate() const
   }
   if (!(tolerance > 0.0))
   {
-    faults.emplace_back("tolerance must be more than 0 px");
+    faults.emplace_back("region_tolerance must be more than 0 px");
   }
   if (!(max_angle_deg > 0.0 && max_angle_deg < 45.0))
   {
-    faults.emplace_back("max_angle_deg must lie in (0, 45)");
+    faults.emplace_back("region_max_angle_deg must lie in (0, 45)");
   }
   if (!(min_support > 0.0))
   {
-    faults.emplace_back("min_support must be more than 0");
+    faults.emplace_back("region_min_support must be more than 0");
+  }
+  if (!(min_correlation >= -1.0 && min_correlation < 1.0))
+  {
+    faults.emplace_back("min_correlation must lie in [-1, 1)");
+  }
+  if (!(min_mean_correlation >= -1.0 && min_mean_correlation < 1.0))
+  {
+    faults.emplace_back("min_mean_correlation must lie in [-1, 1)");
   }
   return faults;
 }
@@ -592,19 +655,16 @@ std::vector<SegmentMatch> agreeingSegments(const Segments& reference, const std:
     {
       continue;
     }
+    const Probe probe(*mapped, tolerance, min_cosine);
     const int bin = LineFeatures::directionBin(*mapped);
     for (int offset = -reach; offset <= reach; ++offset)
     {
       for (const int k : current.inDirection(bin + offset))
       {
-        const Segment& other = current.segments()[static_cast<std::size_t>(k)];
-        if (boxesMeet(*mapped, other, tolerance))
+        const double share = probe.agreement(current.segment(k), current.direction(k));
+        if (share > 0.0)
         {
-          const double share = agreement(*mapped, other, tolerance, min_cosine);
-          if (share > 0.0)
-          {
-            found.push_back({ i, k, share });
-          }
+          found.push_back({ i, k, share });
         }
       }
     }

@@ -9,6 +9,7 @@
 #include <sensor_msgs/image_encodings.h>
 
 #include <algorithm>
+#include <array>
 #include <cstdint>
 #include <limits>
 
@@ -181,6 +182,43 @@ std::vector<PointMatch> toPointMatches(const std::vector<MatchedPoint>& matches)
     return message;
   });
   return messages;
+}
+
+LineSegment toLineSegment(const Segment& segment)
+{
+  LineSegment message;
+  message.x1 = segment.start.x();
+  message.y1 = segment.start.y();
+  message.x2 = segment.end.x();
+  message.y2 = segment.end.y();
+  return message;
+}
+
+std::vector<LineMatch> toLineMatches(const std::vector<MatchedLine>& lines)
+{
+  std::vector<LineMatch> messages(lines.size());
+  std::transform(lines.begin(), lines.end(), messages.begin(), [](const MatchedLine& line) {
+    LineMatch message;
+    message.reference = toLineSegment(line.reference);
+    message.current = toLineSegment(line.current);
+    message.score = line.score;
+    message.plane = line.plane;
+    return message;
+  });
+  return messages;
+}
+
+std::vector<double> toRowMajor(const std::vector<Eigen::Matrix3d>& matrices)
+{
+  std::vector<double> numbers;
+  numbers.reserve(9 * matrices.size());
+  for (const Eigen::Matrix3d& matrix : matrices)
+  {
+    std::array<double, 9> rows;
+    copyRowMajor(matrix, rows);
+    numbers.insert(numbers.end(), rows.begin(), rows.end());
+  }
+  return numbers;
 }
 
 Homography toHomography(const ViewMatch& match, const std::string& view, const std_msgs::Header& header)

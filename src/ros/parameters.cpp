@@ -52,6 +52,15 @@ std::string join(const std::vector<std::string>& words, const std::string& separ
   return text;
 }
 
+template <typename Params>
+Params readTable(ParameterReader& reader)
+{
+  Params params;
+  reader.read(matcherParameters(params));
+  reader.addFaults(params.validate());
+  return params;
+}
+
 }  // namespace
 
 ParameterReader::ParameterReader(const ros::NodeHandle& private_nh) : private_nh_(private_nh)
@@ -162,10 +171,12 @@ void ParameterReader::warnOfUnknown() const
 
 ViewMatcherParams readMatcherParams(ParameterReader& reader)
 {
-  ViewMatcherParams params;
-  reader.read(matcherParameters(params));
-  reader.addFaults(params.validate());
-  return params;
+  return readTable<ViewMatcherParams>(reader);
+}
+
+LineMatcherParams readLineMatcherParams(ParameterReader& reader)
+{
+  return readTable<LineMatcherParams>(reader);
 }
 
 }  // namespace view_servo

@@ -1,10 +1,14 @@
 // Copyright (c) 2026, the view_servo authors
 // SPDX-License-Identifier: BSD-3-Clause
+#include "view_servo/features/line_segments.h"
 #include "view_servo/geometry/correspondence.h"
+#include "view_servo/matching/line_features.h"
 #include "view_servo/views/image_io.h"
+#include "view_servo/views/line_view_matcher.h"
 #include "view_servo/views/matcher_parameters.h"
 #include "view_servo/views/overlay.h"
 #include "view_servo/views/prepared_image.h"
+#include "view_servo/views/segment_io.h"
 #include "view_servo/views/view_matcher.h"
 
 #include <CLI/CLI.hpp>
@@ -18,7 +22,7 @@
 #include <fcntl.h>
 #include <unistd.h>
 
-#include <algorithm>
+#include <chrono>
 #include <cstdio>
 #include <fstream>
 #include <iostream>
@@ -29,11 +33,12 @@
 #include <sstream>
 #include <stdexcept>
 #include <string>
+#include <utility>
 #include <vector>
 
 /** @file
- * `match_images points REF CUR`: matches two image files from the command line. Exit status: 0 a geometry was found,
- * 1 none was found, 2 bad input, with one line on standard error that names the file or option.
+ * `match_images points|lines REF CUR`: matches two image files from the command line. Exit status: 0 a geometry was
+ * found, 1 none was found, 2 bad input, with one line on standard error that names the file or option.
  */
 namespace
 {
@@ -55,12 +60,17 @@ public:
 
 const std::map<std::string, GeometryModel> MODELS{ { "homography", GeometryModel::HOMOGRAPHY },
                                                    { "fundamental", GeometryModel::FUNDAMENTAL } };
+const std::map<std::string, LineGrouping> GROUPS{ { "triplets", LineGrouping::TRIPLETS },
+                                                  { "pairs", LineGrouping::PAIRS } };
 
 struct Options
 {
   std::string reference;
   std::string current;
   std::string model = "homography";
+  std::string groups = "triplets";
+  std::string reference_segments;
+  std::string current_segments;
   std::string overlay;
   std::string truth;
   std::vector<std::string> settings;
@@ -141,9 +151,10 @@ double meanCornerError(const Eigen::Matrix3d& h, const Eigen::Matrix3d& truth, c
   return sum / 4.0;
 }
 
-ViewMatcher makeMatcher(const std::vector<std::string>& settings)
+template <typename Matcher, typename Params>
+Matcher makeMatcher(const std::vector<std::string>& settings)
 {
-  ViewMatcherParams params;
+  Params params;
   for (const std::string& setting : settings)
   {
     const std::size_t equals = setting.find('=');
@@ -162,19 +173,11 @@ ViewMatcher makeMatcher(const std::vector<std::string>& settings)
   }
   try
   {
-    return ViewMatcher(params);
+    return Matcher(params);
   }
   catch (const std::invalid_argument& error)
   {
     throw BadInput(std::string("--set: ") + error.what());
-  }
-}
-
-void checkOverlayPath(const std::string& path)
-{
-  if (!cv::haveImageWriter(path))
-  {
-    throw BadInput("--overlay: '" + path + "' has no ending that says which kind of image to write, such as .png");
   }
 }
 
@@ -191,12 +194,56 @@ void writeOverlay(const std::string& path, const cv::Mat& picture)
   }
 }
 
-nlohmann::json toJson(const Eigen::Vector2d& point)
+nlohmann::ordered_json toJson(const Eigen::Vector2d& point)
 {
   return { point.x(), point.y() };
 }
 
-/** Numbers that are not finite become null. */
+nlohmann::ordered_json toJson(const Segment& segment)
+{
+  return { segment.start.x(), segment.start.y(), segment.end.x(), segment.end.y() };
+}
+
+/** Row by row; null when it is not finite. */
+nlohmann::ordered_json toJson(const Eigen::Matrix3d& matrix)
+{
+  if (!matrix.allFinite())
+  {
+    return nullptr;
+  }
+  const Eigen::Matrix<double, 3, 3, Eigen::RowMajor> rows = matrix;
+  return std::vector<double>(rows.data(), rows.data() + rows.size());
+}
+
+nlohmann::ordered_json toJson(const std::vector<MatchedPoint>& points)
+{
+  nlohmann::ordered_json json = nlohmann::ordered_json::array();
+  for (const MatchedPoint& point : points)
+  {
+    json.push_back({ { "reference", toJson(point.position.reference) },
+                     { "current", toJson(point.position.current) },
+                     { "score", point.score },
+                     { "inlier", point.inlier } });
+  }
+  return json;
+}
+
+nlohmann::ordered_json toJson(const std::vector<MatchedLine>& lines)
+{
+  nlohmann::ordered_json json = nlohmann::ordered_json::array();
+  for (const MatchedLine& line : lines)
+  {
+    json.push_back({ { "reference", toJson(line.reference) },
+                     { "current", toJson(line.current) },
+                     { "reference_index", line.reference_index },
+                     { "current_index", line.current_index },
+                     { "score", line.score },
+                     { "plane", line.plane } });
+  }
+  return json;
+}
+
+/** What points and lines have in common. Numbers that are not finite become null. */
 nlohmann::ordered_json toJson(const ViewMatch& match, const std::string& model,
                               const std::optional<double>& corner_error)
 {
@@ -204,15 +251,7 @@ nlohmann::ordered_json toJson(const ViewMatch& match, const std::string& model,
   json["success"] = match.outcome == MatchOutcome::MATCHED;
   json["message"] = match.message;
   json["model"] = model;
-  json["matrix"] = nullptr;
-  if (match.outcome == MatchOutcome::MATCHED)
-  {
-    json["matrix"] = std::vector<double>();
-    for (int i = 0; i < 9; ++i)
-    {
-      json["matrix"].push_back(match.matrix(i / 3, i % 3));
-    }
-  }
+  json["matrix"] = toJson(match.matrix);
   json["inliers"] = match.inliers;
   json["rms_error"] = match.rms_error;
   if (corner_error)
@@ -223,14 +262,6 @@ nlohmann::ordered_json toJson(const ViewMatch& match, const std::string& model,
   for (const StageTime& stage : match.stages)
   {
     json["elapsed_ms"][stage.name] = stage.ms;
-  }
-  json["matches"] = nlohmann::json::array();
-  for (const MatchedPoint& point : match.matches)
-  {
-    json["matches"].push_back({ { "reference", toJson(point.position.reference) },
-                                { "current", toJson(point.position.current) },
-                                { "score", point.score },
-                                { "inlier", point.inlier } });
   }
   return json;
 }
@@ -254,54 +285,129 @@ void printText(const ViewMatch& match, const Options& options, const std::option
   }
 }
 
+/** What can be told from the options alone, before the images are read. */
+class Report
+{
+public:
+  explicit Report(const Options& options) : options_(options)
+  {
+    if (!options.overlay.empty() && !cv::haveImageWriter(options.overlay))
+    {
+      throw BadInput("--overlay: '" + options.overlay +
+                     "' has no ending that says which kind of image to write, such as .png");
+    }
+    if (!options.truth.empty())
+    {
+      if (options.model != "homography")
+      {
+        throw BadInput("--truth: only homographies can be compared");
+      }
+      truth_ = readHomography(options.truth);
+    }
+  }
+
+  /** Writes the picture and prints the result, in JSON with `more` at its end. */
+  ExitStatus write(const ViewMatch& match, const PreparedImage& reference, const PreparedImage& current,
+                   const nlohmann::ordered_json& more) const
+  {
+    const bool found = match.outcome == MatchOutcome::MATCHED;
+    if (!options_.overlay.empty())
+    {
+      writeOverlay(options_.overlay, drawOverlay(reference, current, match));
+    }
+    std::optional<double> corner_error;
+    if (truth_ && found)
+    {
+      corner_error = meanCornerError(match.matrix, *truth_, reference.grey().size());
+    }
+    if (options_.json)
+    {
+      nlohmann::ordered_json json = toJson(match, options_.model, corner_error);
+      json.update(more);
+      std::cout << json << '\n';
+    }
+    else
+    {
+      printText(match, options_, corner_error);
+    }
+    return found ? FOUND : NOTHING_FOUND;
+  }
+
+private:
+  const Options& options_;
+  std::optional<Eigen::Matrix3d> truth_;
+};
+
 ExitStatus matchPoints(const Options& options)
 {
-  const GeometryModel model = MODELS.at(options.model);
-  if (options.threads > 0)
-  {
-    cv::setNumThreads(options.threads);
-  }
-  const ViewMatcher matcher = makeMatcher(options.settings);
-  if (!options.overlay.empty())
-  {
-    checkOverlayPath(options.overlay);
-  }
-  std::optional<Eigen::Matrix3d> truth;
-  if (!options.truth.empty())
-  {
-    truth = readHomography(options.truth);
-  }
+  const auto matcher = makeMatcher<ViewMatcher, ViewMatcherParams>(options.settings);
+  const Report report(options);
   const PreparedImage reference(readImage(options.reference), cv::Rect(), matcher.params().points);
   const PreparedImage current(readImage(options.current), cv::Rect(), matcher.params().points);
-
-  const ViewMatch match = matcher.match(reference, current, model);
-  const bool found = match.outcome == MatchOutcome::MATCHED;
-  if (!options.overlay.empty())
-  {
-    writeOverlay(options.overlay, drawOverlay(reference, current, match));
-  }
-  std::optional<double> corner_error;
-  if (truth && found)
-  {
-    corner_error = meanCornerError(match.matrix, *truth, reference.grey().size());
-  }
-  if (options.json)
-  {
-    std::cout << toJson(match, options.model, corner_error) << '\n';
-  }
-  else
-  {
-    printText(match, options, corner_error);
-  }
-  return found ? FOUND : NOTHING_FOUND;
+  const ViewMatch match = matcher.match(reference, current, MODELS.at(options.model));
+  return report.write(match, reference, current, { { "matches", toJson(match.matches) } });
 }
 
-void listParameters()
+/** Runs from its construction on. */
+class Stopwatch
 {
-  ViewMatcherParams defaults;
+public:
+  double elapsedMs() const
+  {
+    return std::chrono::duration<double, std::milli>(Clock::now() - start_).count();
+  }
+
+private:
+  using Clock = std::chrono::steady_clock;
+  Clock::time_point start_ = Clock::now();
+};
+
+/** From the file, directed as detected ones are; without a file those detected. */
+Segments segmentsOf(const cv::Mat& grey, const std::string& file, const LineSegmentParams& params)
+{
+  return file.empty() ? detectLineSegments(grey, params) : directedByContrast(grey, readSegments(file));
+}
+
+ExitStatus matchLines(const Options& options)
+{
+  const auto matcher = makeMatcher<LineViewMatcher, LineMatcherParams>(options.settings);
+  const LineMatcherParams& params = matcher.params();
+  const Report report(options);
+  const PreparedImage reference(readImage(options.reference), cv::Rect(), {});
+  const PreparedImage current(readImage(options.current), cv::Rect(), {});
+
+  const Stopwatch stopwatch;
+  Segments reference_segments = segmentsOf(reference.grey(), options.reference_segments, params.segments);
+  Segments current_segments = segmentsOf(current.grey(), options.current_segments, params.segments);
+  const double segments_ms = stopwatch.elapsedMs();
+  const LineFeatures reference_lines(reference.grey(), std::move(reference_segments), params.features);
+  const LineFeatures current_lines(current.grey(), std::move(current_segments), params.features);
+  const double prepared_ms = stopwatch.elapsedMs();
+  ViewMatch match = matcher.match(reference_lines, current_lines, MODELS.at(options.model), GROUPS.at(options.groups));
+  match.stages.insert(match.stages.begin(),
+                      { { "segments", segments_ms }, { "neighbours", prepared_ms - segments_ms } });
+  match.elapsed_ms += prepared_ms;
+
+  nlohmann::ordered_json planes = nlohmann::ordered_json::array();
+  for (const Eigen::Matrix3d& plane : match.planes)
+  {
+    planes.push_back(toJson(plane));
+  }
+  return report.write(match, reference, current,
+                      { { "matches", toJson(match.lines) },
+                        { "points", toJson(match.matches) },
+                        { "planes", planes },
+                        { "fundamental", toJson(match.fundamental) } });
+}
+
+template <typename Params>
+void listParameters(const std::string& subcommand)
+{
+  Params defaults;
+  std::cout << subcommand << ":\n";
   for (const Parameter& parameter : matcherParameters(defaults))
   {
-    std::cout << parameter.name << " (" << parameter.type << ", default " << parameter.get()
+    std::cout << "  " << parameter.name << " (" << parameter.type << ", default " << parameter.get()
               << "): " << parameter.description << '\n';
   }
 }
@@ -318,6 +424,29 @@ std::string oneLine(const std::string& text)
   return joined;
 }
 
+/** What both subcommands take. `more_settings` are positional. */
+CLI::App* addSubcommand(CLI::App& app, const std::string& name, const std::string& description, Options& options,
+                        std::vector<std::string>& more_settings)
+{
+  CLI::App* command = app.add_subcommand(name, description);
+  command->add_option("REF", options.reference, "Reference image: the stored view")->required();
+  command->add_option("CUR", options.current, "Current image: what the camera sees now")->required();
+  command->add_option("--model", options.model, "homography: the scene is a plane; fundamental: it has depth")
+      ->check(CLI::IsMember(MODELS))
+      ->capture_default_str();
+  command->add_option("--overlay", options.overlay, "Write a picture of the matches to this file");
+  command->add_flag("--json", options.json, "Print the result as one JSON object");
+  command->add_option("--threads", options.threads, "Threads to use; 0: one a core")
+      ->check(CLI::Range(0, 1024))
+      ->capture_default_str();
+  command->add_option("--set", options.settings, "name=value: another value for a parameter; see --list-parameters")
+      ->allow_extra_args(false);  // else it would take REF and CUR when it comes before them
+  command->add_option("SETTING", more_settings, "More name=value after --set");
+  command->add_option("--truth", options.truth,
+                      "File with the true homography; prints the mean error at the reference's corners");
+  return command;
+}
+
 }  // namespace
 
 int main(int argc, char** argv)
@@ -325,45 +454,40 @@ int main(int argc, char** argv)
   cv::utils::logging::setLogLevel(cv::utils::logging::LOG_LEVEL_SILENT);
 
   Options options;
+  std::vector<std::string> more_settings;
   bool list_parameters = false;
   CLI::App app("Matches two images of a scene, over wide changes of viewpoint.", "match_images");
   app.footer("Exit status: 0 a geometry was found, 1 none was found, 2 bad input.");
+  app.require_subcommand(0, 1);
   app.add_flag("--list-parameters", list_parameters, "Print the names that --set knows, and end");
-  CLI::App* points = app.add_subcommand("points", "By the intensity profiles between corners");
-  points->add_option("REF", options.reference, "Reference image: the stored view")->required();
-  points->add_option("CUR", options.current, "Current image: what the camera sees now")->required();
-  points->add_option("--model", options.model, "homography: the scene is a plane; fundamental: it has depth")
-      ->check(CLI::IsMember(MODELS))
+  const CLI::App* points =
+      addSubcommand(app, "points", "By the intensity profiles between corners", options, more_settings);
+  CLI::App* lines = addSubcommand(app, "lines", "By the structure of groups of line segments", options, more_settings);
+  lines->add_option("--groups", options.groups, "Groups of segments that vote: three lines or two")
+      ->check(CLI::IsMember(GROUPS))
       ->capture_default_str();
-  points->add_option("--overlay", options.overlay, "Write a picture of the matches to this file");
-  points->add_flag("--json", options.json, "Print the result as one JSON object");
-  points->add_option("--threads", options.threads, "Threads to use; 0: one a core")
-      ->check(CLI::Range(0, 1024))
-      ->capture_default_str();
-  points->add_option("--set", options.settings, "name=value: another value for a parameter; see --list-parameters")
-      ->allow_extra_args(false);  // else it would take REF and CUR when it comes before them
-  std::vector<std::string> more_settings;
-  points->add_option("SETTING", more_settings, "More name=value after --set");
-  points->add_option("--truth", options.truth,
-                     "File with the true homography; prints the mean error at the reference's corners");
+  lines->add_option("--segments-ref", options.reference_segments,
+                    "File with the reference's segments, a line x1 y1 x2 y2 each; else they are detected");
+  lines->add_option("--segments-cur", options.current_segments, "File with the current image's segments");
   try
   {
     app.parse(argc, argv);
     if (list_parameters)
     {
-      listParameters();
+      listParameters<ViewMatcherParams>("points");
+      listParameters<LineMatcherParams>("lines");
       return FOUND;
     }
-    if (!points->parsed())
+    if (!points->parsed() && !lines->parsed())
     {
       throw BadInput("say what to match, such as: match_images points REF CUR");
     }
-    if (!options.truth.empty() && options.model != "homography")
-    {
-      throw BadInput("--truth: only homographies can be compared");
-    }
     options.settings.insert(options.settings.end(), more_settings.begin(), more_settings.end());
-    return matchPoints(options);
+    if (options.threads > 0)
+    {
+      cv::setNumThreads(options.threads);
+    }
+    return points->parsed() ? matchPoints(options) : matchLines(options);
   }
   catch (const CLI::ParseError& error)
   {

@@ -26,6 +26,8 @@ namespace view_servo
 namespace
 {
 constexpr double NOT_A_NUMBER = std::numeric_limits<double>::quiet_NaN();
+/** Support that the best region must have; nine of ten of the best regions of unrelated images have less than 7.1. */
+constexpr double BEYOND_CHANCE = 8.0;
 constexpr double HUBER_WIDTH = 0.5;  // of the final fits: residuals beyond count linearly [px]
 
 /** How sure a match is: the mean of what the segments share and of how alike their surroundings look. */
@@ -60,6 +62,10 @@ public:
     std::vector<LineRegion> all = findLineRegions(from_, to_, association, params_.regions);
     std::stable_sort(all.begin(), all.end(),
                      [](const LineRegion& a, const LineRegion& b) { return a.support > b.support; });
+    if (all.empty() || all.front().support < BEYOND_CHANCE)
+    {
+      return;
+    }
     std::vector<char> reference_used(from_.segments().size(), 0);
     std::vector<char> current_used(to_.segments().size(), 0);
     for (LineRegion& region : all)

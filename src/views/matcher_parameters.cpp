@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
+#include <iterator>
 #include <locale>
 #include <sstream>
 #include <stdexcept>
@@ -117,6 +118,21 @@ Parameter boolean(std::string name, bool& value, std::string description)
   return parameter;
 }
 
+/** How RANSAC draws its samples is for the caller to offer. */
+void appendRansac(RansacParams& ransac, std::vector<Parameter>& table)
+{
+  std::vector<Parameter> more{
+    real("inlier_threshold", ransac.inlier_threshold, "largest error of an inlier [px], > 0"),
+    real("ransac_confidence", ransac.confidence, "wanted probability of an outlier-free sample, (0, 1)"),
+    integer("ransac_min_iterations", ransac.min_iterations, "samples drawn at least, >= 0"),
+    integer("ransac_max_iterations", ransac.max_iterations, "samples drawn at most, >= 1"),
+    integer("ransac_max_rejected", ransac.max_rejected, "samples that a cheap test may refuse, >= 0"),
+    integer("local_optimizations", ransac.local_optimizations, "refits of a new best model, 0 = off"),
+    boolean("improvement_stage", ransac.improvement_stage, "exchange each datum of the best sample in turn"),
+  };
+  std::move(more.begin(), more.end(), std::back_inserter(table));
+}
+
 std::size_t editDistance(const std::string& a, const std::string& b)
 {
   std::vector<std::size_t> row(b.size() + 1);
@@ -138,6 +154,20 @@ std::size_t editDistance(const std::string& a, const std::string& b)
   return row[b.size()];
 }
 
+void setIn(const std::vector<Parameter>& table, const std::string& name, const std::string& value)
+{
+  const auto found =
+      std::find_if(table.begin(), table.end(), [&](const Parameter& parameter) { return parameter.name == name; });
+  if (found == table.end())
+  {
+    throw std::invalid_argument("unknown parameter '" + name + "' (did you mean '" + nearestName(table, name) + "'?)");
+  }
+  if (!found->set(value))
+  {
+    throw std::invalid_argument("parameter '" + name + "': '" + value + "' is not of type " + found->type);
+  }
+}
+
 }  // namespace
 
 std::string nearestName(const std::vector<Parameter>& table, const std::string& name)
@@ -154,7 +184,7 @@ std::vector<Parameter> matcherParameters(ViewMatcherParams& params)
   CornerParams& corners = points.corners;
   ProfileParams& profiles = points.profiles;
   ProfileSearchParams& search = points.search;
-  return {
+  std::vector<Parameter> table{
     integer("max_corners", corners.max_corners, "corners kept in each image, strongest first, 1 to 5000"),
     real("derivative_sigma", corners.derivative_sigma, "scale of the Harris detector's derivatives [px], (0, 20]"),
     real("integration_sigma", corners.integration_sigma, "scale of the Harris detector's window [px], (0, 20]"),
@@ -184,13 +214,6 @@ std::vector<Parameter> matcherParameters(ViewMatcherParams& params)
     boolean("cyclic_order", points.cyclic_order, "align the profiles around corners in cyclic order"),
     real("cyclic_correlation", points.min_correlation, "least correlation of aligned profiles, [0, 1)"),
     integer("cyclic_entries", points.cyclic_entries, "entries aligned in each row and column, 0 = all"),
-    real("inlier_threshold", params.ransac.inlier_threshold, "largest error of an inlier [px], > 0"),
-    real("ransac_confidence", params.ransac.confidence, "wanted probability of an outlier-free sample, (0, 1)"),
-    integer("ransac_min_iterations", params.ransac.min_iterations, "samples drawn at least, >= 0"),
-    integer("ransac_max_iterations", params.ransac.max_iterations, "samples drawn at most, >= 1"),
-    integer("ransac_max_rejected", params.ransac.max_rejected, "samples that a cheap test may refuse, >= 0"),
-    integer("local_optimizations", params.ransac.local_optimizations, "refits of a new best model, 0 = off"),
-    boolean("improvement_stage", params.ransac.improvement_stage, "exchange each datum of the best sample in turn"),
     choice<Sampling>("sampling", params.ransac.sampling,
                      { { "uniform", Sampling::UNIFORM }, { "progressive", Sampling::PROGRESSIVE } },
                      "draw all candidates alike, or the best first (PROSAC)"),
@@ -211,21 +234,72 @@ std::vector<Parameter> matcherParameters(ViewMatcherParams& params)
     real("min_significance", params.min_log_significance, "-log10 of the false alarms a geometry may have, >= 0"),
     natural("seed", params.seed, "of all random draws, >= 0"),
   };
+  appendRansac(params.ransac, table);
+  return table;
+}
+
+std::vector<Parameter> matcherParameters(LineMatcherParams& params)
+{
+  LineSegmentParams& segments = params.segments;
+  LineFeatureParams& features = params.features;
+  LineGroupParams& groups = features.groups;
+  LineRegionParams& regions = params.regions;
+  std::vector<Parameter> table{
+    choice<SegmentDetector>("detector", segments.detector,
+                            { { "canny", SegmentDetector::CANNY }, { "lsd", SegmentDetector::LSD } },
+                            "subdivided edges, or OpenCV's Line Segment Detector"),
+    real("edge_sigma", segments.sigma, "scale of the edges [px], [0.6, 20]: about 1 for fine, 2 for coarse ones"),
+    real("edge_low_threshold", segments.low_threshold, "canny: least slope all along an edge [grey levels/px], > 0"),
+    real("edge_high_threshold", segments.high_threshold,
+         "canny: least slope somewhere on an edge [grey levels/px], >= edge_low_threshold"),
+    real("segment_deviation", segments.min_deviation,
+         "canny: smaller deviations from a straight line are noise [px], > 0"),
+    real("segment_max_deviation", segments.max_deviation,
+         "canny: largest deviation of a segment's edge from its line [px], >= segment_deviation"),
+    real("segment_significance", segments.min_significance, "canny: least length over greatest deviation, >= 0"),
+    real("segment_min_length", segments.min_length, "shortest segment detected [px], (0, 10000]"),
+    integer("max_segments", segments.max_segments, "segments detected in each image, the longest, >= 1"),
+    choice<LineOrder>("line_order", groups.order,
+                      { { "contrast", LineOrder::CONTRAST }, { "upright", LineOrder::UPRIGHT } },
+                      "which end is first: bright side left (free of roll), or upwards and to the right"),
+    real("group_distance", groups.max_distance, "from each segment of a pair to where their lines meet [px], > 0"),
+    real("group_collinearity", groups.collinearity, "a point this close to a line counts as on it [px], >= 0"),
+    real("group_min_angle_deg", groups.min_angle_deg, "least angle between the lines of a pair [degrees], (0, 90)"),
+    integer("group_neighbours", groups.max_neighbours, "pairs that a segment forms, the closest, 0 = no limit"),
+    real("group_min_weight", groups.min_weight, "structures less likely than this are left out, [0, 1)"),
+    integer("max_grouped", features.max_grouped, "segments that form groups, the longest, 1 to 5000"),
+    integer("neighbours", features.neighbours, "nearest segments of each that judge a hypothesis, 6 to 1000"),
+    integer("neighbour_pairs", features.neighbour_pairs, "nearest segments of each that make one, 2 to 100"),
+    integer("max_candidates", regions.max_candidates, "counterparts tried for a segment, those with most votes, >= 1"),
+    integer("max_companions", regions.max_companions,
+            "matches of neighbours tried with it, those with most votes, >= 2"),
+    integer("max_hypotheses", regions.max_hypotheses, "affine maps tried for a counterpart, >= 1"),
+    real("affine_tolerance", regions.affine_tolerance, "of segments under a local affine map, across [px], > 0"),
+    real("region_tolerance", regions.tolerance, "of segments under a region's homography, across [px], > 0"),
+    real("region_max_angle_deg", regions.max_angle_deg,
+         "largest angle between a mapped segment and its counterpart [degrees], (0, 45)"),
+    real("region_min_support", regions.min_support, "least sum of a region's matches, whole ones counting 1, > 0"),
+    real("min_correlation", regions.min_correlation,
+         "least correlation of what lies beside two segments, on the better side, [-1, 1)"),
+    real("min_mean_correlation", regions.min_mean_correlation, "least mean of it over a region's matches, [-1, 1)"),
+    real("plane_threshold", params.plane_threshold, "largest error of a line on a plane, across [px], > 0"),
+    integer("min_plane_lines", params.min_plane_lines, "lines that make a plane, >= 5"),
+    integer("max_planes", params.max_planes, "planes looked for, >= 1"),
+    real("min_quality", params.min_quality, "least mean of a match's overlap and correlation, [0, 1)"),
+    natural("seed", params.seed, "of all random draws, >= 0"),
+  };
+  appendRansac(params.ransac, table);
+  return table;
 }
 
 void setParameter(ViewMatcherParams& params, const std::string& name, const std::string& value)
 {
-  const std::vector<Parameter> table = matcherParameters(params);
-  const auto found =
-      std::find_if(table.begin(), table.end(), [&](const Parameter& parameter) { return parameter.name == name; });
-  if (found == table.end())
-  {
-    throw std::invalid_argument("unknown parameter '" + name + "' (did you mean '" + nearestName(table, name) + "'?)");
-  }
-  if (!found->set(value))
-  {
-    throw std::invalid_argument("parameter '" + name + "': '" + value + "' is not of type " + found->type);
-  }
+  setIn(matcherParameters(params), name, value);
+}
+
+void setParameter(LineMatcherParams& params, const std::string& name, const std::string& value)
+{
+  setIn(matcherParameters(params), name, value);
 }
 
 }  // namespace view_servo

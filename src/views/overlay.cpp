@@ -8,6 +8,8 @@
 #include <opencv2/imgproc.hpp>
 
 #include <algorithm>
+#include <cmath>
+#include <cstddef>
 #include <iomanip>
 #include <sstream>
 #include <string>
@@ -23,6 +25,10 @@ constexpr double MAX_WIDTH = 1600.0;
 constexpr int GAP = 4;              // between the images [px]
 constexpr int CAPTION_HEIGHT = 30;  // [px]
 constexpr double LINE_OPACITY = 0.45;
+constexpr double DIMMED = 0.6;  // brightness of the images under matched segments
+
+/** More matched segments than these are not numbered: the numbers would hide each other. */
+constexpr std::size_t MAX_NUMBERS = 60;
 
 /** Coordinates handed to OpenCV are fixed-point numbers with this many fractional bits. */
 constexpr int SHIFT = 4;
@@ -49,6 +55,18 @@ struct Placement
   }
 };
 
+/** The part of the picture that shows an image; what is drawn on it ends at the image's border. */
+struct Canvas
+{
+  cv::Mat area;
+  Placement place;  ///< in the area
+
+  Canvas(const Placement& placement, cv::Mat& picture)
+    : area(picture(placement.area)), place{ cv::Rect(cv::Point(), placement.area.size()), placement.scale }
+  {
+  }
+};
+
 cv::Point fixedPoint(const Eigen::Vector2d& point)
 {
   const double one = 1 << SHIFT;
@@ -66,18 +84,31 @@ void drawDot(cv::Mat& picture, const Eigen::Vector2d& centre, double radius, con
   cv::circle(picture, fixedPoint(centre), cvRound(radius * (1 << SHIFT)), colour, cv::FILLED, cv::LINE_AA, SHIFT);
 }
 
-/** Hue by the place from left to right, brightness from top to bottom. */
-cv::Scalar colourOf(const Eigen::Vector2d& pixel, const cv::Size& size)
+/** @param hue in [0, 180). @param saturation, value in [0, 255]. */
+cv::Scalar colourOf(double hue, double saturation, double value)
 {
-  const double x = std::clamp(pixel.x() / size.width, 0.0, 1.0);
-  const double y = std::clamp(pixel.y() / size.height, 0.0, 1.0);
-  const cv::Mat hsv(1, 1, CV_8UC3, cv::Scalar(150.0 * x, 210.0, 255.0 - 80.0 * y));
+  const cv::Mat hsv(1, 1, CV_8UC3, cv::Scalar(hue, saturation, value));
   cv::Mat bgr;
   cv::cvtColor(hsv, bgr, cv::COLOR_HSV2BGR);
   return cv::Scalar(bgr.at<cv::Vec3b>(0, 0));
 }
 
-void place(const cv::Mat& grey, const Placement& placement, cv::Mat& picture)
+/** Hue by the place from left to right, brightness from top to bottom. */
+cv::Scalar colourOf(const Eigen::Vector2d& pixel, const cv::Size& size)
+{
+  const double x = std::clamp(pixel.x() / size.width, 0.0, 1.0);
+  const double y = std::clamp(pixel.y() / size.height, 0.0, 1.0);
+  return colourOf(150.0 * x, 210.0, 255.0 - 80.0 * y);
+}
+
+/** Hues a golden angle apart: any few that follow each other are unlike. */
+cv::Scalar colourOfRank(std::size_t rank)
+{
+  constexpr double GOLDEN_ANGLE = 137.50776 / 2.0;  // [OpenCV's hue]
+  return colourOf(std::fmod(static_cast<double>(rank) * GOLDEN_ANGLE, 180.0), 190.0, 255.0);
+}
+
+void drawImage(const cv::Mat& grey, const Placement& placement, cv::Mat& picture)
 {
   cv::Mat scaled;
   cv::resize(grey, scaled, placement.area.size(), 0.0, 0.0, placement.scale < 1.0 ? cv::INTER_AREA : cv::INTER_LINEAR);
@@ -117,22 +148,20 @@ Eigen::Matrix3d facingInliers(const ViewMatch& match)
   return behind ? Eigen::Matrix3d(-match.matrix) : match.matrix;
 }
 
-/** Draws a polygon of an image, clipped to that image; parts with NaN or far outside are left out. */
-void drawOutline(const Points& polygon, const Placement& placement, cv::Mat& picture)
+/** Draws a polygon of an image; parts with NaN or far outside are left out. */
+void drawOutline(const Points& polygon, Canvas canvas)
 {
-  cv::Mat area = picture(placement.area);
-  const Placement within{ cv::Rect(cv::Point(), placement.area.size()), placement.scale };
   const double far = 10.0 * MAX_WIDTH;
   const auto drawable = [&](const Eigen::Vector2d& point) {
     return point.allFinite() && point.cwiseAbs().maxCoeff() < far;
   };
   for (std::size_t i = 0; i + 1 < polygon.size(); ++i)
   {
-    const Eigen::Vector2d from = within(polygon[i]);
-    const Eigen::Vector2d to = within(polygon[i + 1]);
+    const Eigen::Vector2d from = canvas.place(polygon[i]);
+    const Eigen::Vector2d to = canvas.place(polygon[i + 1]);
     if (drawable(from) && drawable(to))
     {
-      drawLine(area, from, to, OUTLINE_COLOUR, 2);
+      drawLine(canvas.area, from, to, OUTLINE_COLOUR, 2);
     }
   }
 }
@@ -145,6 +174,10 @@ std::string caption(const ViewMatch& match)
   }
   std::ostringstream text;
   text << match.message << ", rms error " << std::fixed << std::setprecision(2) << match.rms_error << " px";
+  if (match.planes.size() > 1)
+  {
+    text << "; beads: further planes";
+  }
   return text.str();
 }
 
@@ -185,6 +218,69 @@ void drawMatches(const ViewMatch& match, const cv::Size& reference_size, const P
   }
 }
 
+/**
+ * A matched segment, in two strokes so that it stands out from any ground. Those of the first plane are plain, those of
+ * the n-th carry n - 1 white beads, those of none are thin.
+ */
+void drawSegment(const Segment& segment, int plane, const cv::Scalar& colour, Canvas& canvas)
+{
+  const Eigen::Vector2d start = canvas.place(segment.start);
+  const Eigen::Vector2d end = canvas.place(segment.end);
+  const int thickness = plane < 0 ? 1 : 2;
+  drawLine(canvas.area, start, end, BACKGROUND, thickness + 2);
+  drawLine(canvas.area, start, end, colour, thickness);
+  constexpr double BEAD_DISTANCE = 7.0;
+  for (int bead = 0; bead < plane; ++bead)
+  {
+    const double offset = (bead - 0.5 * (plane - 1)) * BEAD_DISTANCE;
+    const Eigen::Vector2d at = 0.5 * (start + end) + offset * segment.direction();
+    drawDot(canvas.area, at, 3.5, BACKGROUND);
+    drawDot(canvas.area, at, 2.5, CAPTION_COLOUR);
+  }
+}
+
+/** Beside the middle of a segment. */
+void drawNumber(const std::string& number, const Segment& segment, const cv::Scalar& colour, Canvas& canvas)
+{
+  constexpr double FONT_SCALE = 0.4;
+  constexpr double DISTANCE = 9.0;
+  const int font = cv::FONT_HERSHEY_SIMPLEX;
+  const Eigen::Vector2d centre = canvas.place(segment.midpoint()) + DISTANCE * segment.normal();
+  int baseline = 0;
+  const cv::Size size = cv::getTextSize(number, font, FONT_SCALE, 1, &baseline);
+  const cv::Point origin(cvRound(centre.x() - 0.5 * size.width), cvRound(centre.y() + 0.5 * size.height));
+  cv::putText(canvas.area, number, origin, font, FONT_SCALE, BACKGROUND, 3, cv::LINE_AA);
+  cv::putText(canvas.area, number, origin, font, FONT_SCALE, colour, 1, cv::LINE_AA);
+}
+
+/** Matched segments in both images, a pair in one colour, and their intersections. */
+void drawLines(const ViewMatch& match, Canvas left, Canvas right)
+{
+  left.area *= DIMMED;
+  right.area *= DIMMED;
+  // Where segments cross they hide this; an intersection off them is what needs to be shown.
+  constexpr double INTERSECTION_RADIUS = 1.3;
+  for (const MatchedPoint& point : match.matches)
+  {
+    const cv::Scalar& colour = point.inlier ? OUTLINE_COLOUR : CANDIDATE_COLOUR;
+    drawDot(left.area, left.place(point.position.reference), INTERSECTION_RADIUS, colour);
+    drawDot(right.area, right.place(point.position.current), INTERSECTION_RADIUS, colour);
+  }
+  // The best come last and so on top.
+  for (std::size_t rank = match.lines.size(); rank-- > 0;)
+  {
+    const MatchedLine& line = match.lines[rank];
+    drawSegment(line.reference, line.plane, colourOfRank(rank), left);
+    drawSegment(line.current, line.plane, colourOfRank(rank), right);
+  }
+  for (std::size_t rank = 0; rank < match.lines.size() && match.lines.size() <= MAX_NUMBERS; ++rank)
+  {
+    const std::string number = std::to_string(rank + 1);
+    drawNumber(number, match.lines[rank].reference, colourOfRank(rank), left);
+    drawNumber(number, match.lines[rank].current, colourOfRank(rank), right);
+  }
+}
+
 }  // namespace
 
 cv::Mat drawOverlay(const PreparedImage& reference, const PreparedImage& current, const ViewMatch& match)
@@ -201,17 +297,24 @@ cv::Mat drawOverlay(const PreparedImage& reference, const PreparedImage& current
   const cv::Rect images = left.area | right.area;
 
   cv::Mat picture(images.height + CAPTION_HEIGHT, images.width, CV_8UC3, BACKGROUND);
-  place(reference.grey(), left, picture);
-  place(current.grey(), right, picture);
-  drawMatches(match, reference_size, left, right, picture);
-  if (match.outcome == MatchOutcome::MATCHED && match.model == GeometryModel::HOMOGRAPHY)
+  drawImage(reference.grey(), left, picture);
+  drawImage(current.grey(), right, picture);
+  if (match.lines.empty())
+  {
+    drawMatches(match, reference_size, left, right, picture);
+  }
+  else
+  {
+    drawLines(match, { left, picture }, { right, picture });
+  }
+  if (match.outcome == MatchOutcome::MATCHED && match.model == GeometryModel::HOMOGRAPHY && match.planes.size() < 2)
   {
     Points polygon = outline(reference.region());
-    drawOutline(polygon, left, picture);
+    drawOutline(polygon, { left, picture });
     const Eigen::Matrix3d h = facingInliers(match);
     std::transform(polygon.begin(), polygon.end(), polygon.begin(),
                    [&](const Eigen::Vector2d& point) { return transfer(h, point); });
-    drawOutline(polygon, right, picture);
+    drawOutline(polygon, { right, picture });
   }
   writeCaption(caption(match), picture.rowRange(images.height, picture.rows));
   return picture;

@@ -16,7 +16,7 @@ namespace
 constexpr int MIN_SIDE = 64;  // of a reduced image [px]
 }
 
-PreparedImage::PreparedImage(cv::Mat grey, const cv::Rect& region, const PointMatcherParams& params)
+PreparedImage::PreparedImage(cv::Mat grey, const cv::Rect& region, const FeatureParams& params)
   : grey_(std::move(grey)), region_(region), params_(params)
 {
   if (grey_.type() != CV_8UC1 || grey_.empty())
@@ -77,7 +77,7 @@ const PointFeatures& PreparedImage::points(int number) const
   Level& wanted = level(number);
   std::call_once(wanted.points_once, [&] {
     const cv::Mat& reduced = image(number);
-    wanted.points.profiles.coefficients = params_.profiles.coefficients;
+    wanted.points.profiles.coefficients = params_.points.profiles.coefficients;
     if (reduced.empty())
     {
       return;
@@ -89,7 +89,7 @@ const PointFeatures& PreparedImage::points(int number) const
       full(region_).setTo(255);
       cv::resize(full, mask, reduced.size(), 0.0, 0.0, cv::INTER_NEAREST);
     }
-    wanted.points = extractPointFeatures(reduced, params_, mask);
+    wanted.points = extractPointFeatures(reduced, params_.points, mask);
   });
   return wanted.points;
 }
@@ -100,6 +100,14 @@ const ProfileIndex& PreparedImage::profileIndex(int number) const
   const PointFeatures& features = points(number);
   std::call_once(wanted.index_once, [&] { wanted.index = std::make_unique<ProfileIndex>(features.profiles); });
   return *wanted.index;
+}
+
+const LineFeatures& PreparedImage::lines() const
+{
+  std::call_once(lines_once_, [&] {
+    lines_ = std::make_unique<LineFeatures>(grey_, detectLineSegments(grey_, params_.segments, region_), params_.lines);
+  });
+  return *lines_;
 }
 
 }  // namespace view_servo

@@ -7,7 +7,7 @@
 
 namespace view_servo
 {
-ViewCache::ViewCache(ViewStore store, const PointMatcherParams& params, std::size_t capacity)
+ViewCache::ViewCache(ViewStore store, const FeatureParams& params, std::size_t capacity)
   : store_(std::move(store)), params_(params), capacity_(std::max<std::size_t>(capacity, 1))
 {
 }

@@ -18,11 +18,11 @@ namespace
 {
 using view_servo::detectLineSegments;
 using view_servo::directedByContrast;
-using view_servo::Segment;
 using view_servo::LineSegmentParams;
-using view_servo::Segments;
+using view_servo::Segment;
 using view_servo::segmentContrast;
 using view_servo::SegmentDetector;
+using view_servo::Segments;
 using view_servo::test::disturbed;
 using view_servo::test::drawnPicture;
 using view_servo::test::isInside;
@@ -42,17 +42,17 @@ const std::vector<Patch>& patches()
 {
   static const std::vector<Patch> scene = {
     { { { 30.2, 25.7 }, { 130.6, 40.1 }, { 120.3, 90.4 }, { 24.9, 84.6 } }, 190.0 },
-    { { { 180.4, 20.3 }, { 240.7, 110.2 }, { 165.1, 115.8 } }, 40.0 },
+    { { { 185.4, 24.3 }, { 244.7, 40.2 }, { 250.1, 104.8 }, { 204.6, 118.2 }, { 164.7, 81.9 } }, 40.0 },
     { { { 60.0, 120.0 }, { 110.0, 120.0 }, { 110.0, 200.0 }, { 60.0, 200.0 } }, 60.0 },
     { { { 205.5, 140.5 }, { 255.5, 190.5 }, { 205.5, 240.5 }, { 155.5, 190.5 } }, 170.0 },
-    { { { 14.3, 130.2 }, { 31.9, 131.8 }, { 28.7, 226.4 }, { 11.2, 225.9 } }, 220.0 },
+    { { { 290.3, 30.2 }, { 345.1, 36.8 }, { 338.7, 126.4 }, { 283.2, 121.9 } }, 220.0 },
   };
   return scene;
 }
 
 cv::Mat patchesPicture()
 {
-  static const cv::Mat picture = drawnPicture(cv::Size(280, 260), [](const Eigen::Vector2d& point) {
+  static const cv::Mat picture = drawnPicture(cv::Size(370, 260), [](const Eigen::Vector2d& point) {
     const auto patch = std::find_if(patches().begin(), patches().end(),
                                     [&](const Patch& candidate) { return isInside(candidate.polygon, point); });
     return patch == patches().end() ? GROUND : patch->grey;
@@ -76,19 +76,24 @@ Segments trueSegments()
   return segments;
 }
 
-/** Every true segment has exactly one that is like it, and there are no others. */
-void expectTrueSegments(const Segments& found, double max_distance, double max_angle_deg)
+/** How many of the true segments are found just once, with ends as close as `max_distance` [px]. */
+std::ptrdiff_t countTrueSegments(const Segments& found, double max_distance, double max_angle_deg)
 {
   const Segments truth = trueSegments();
-  EXPECT_EQ(found.size(), truth.size());
-  for (const Segment& side : truth)
-  {
-    const auto same = std::count_if(found.begin(), found.end(), [&](const Segment& segment) {
-      return (segment.start - side.start).norm() < max_distance && (segment.end - side.end).norm() < max_distance &&
-             segment.direction().dot(side.direction()) > std::cos(max_angle_deg * M_PI / 180.0);
-    });
-    EXPECT_EQ(same, 1) << side.start.transpose() << " to " << side.end.transpose();
-  }
+  return std::count_if(truth.begin(), truth.end(), [&](const Segment& side) {
+    return std::count_if(found.begin(), found.end(), [&](const Segment& segment) {
+             return (segment.start - side.start).norm() < max_distance &&
+                    (segment.end - side.end).norm() < max_distance &&
+                    segment.direction().dot(side.direction()) > std::cos(max_angle_deg * M_PI / 180.0);
+           }) == 1;
+  });
+}
+
+/** Every true segment is found once, and nothing else is. */
+void expectTrueSegments(const Segments& found, double max_distance, double max_angle_deg)
+{
+  EXPECT_EQ(found.size(), trueSegments().size());
+  EXPECT_EQ(countTrueSegments(found, max_distance, max_angle_deg), static_cast<std::ptrdiff_t>(trueSegments().size()));
 }
 
 /** Brighter by 60 grey levels above the line from (0, 30.5) to the right. */
@@ -109,17 +114,23 @@ cv::Mat wave(double amplitude)
 
 TEST(LineSegments, AreTheSidesOfPolygons)
 {
-  expectTrueSegments(detectLineSegments(patchesPicture(), LineSegmentParams()), 1.0, 0.1);
+  expectTrueSegments(detectLineSegments(patchesPicture(), LineSegmentParams()), 0.1, 0.1);
 }
 
 TEST(LineSegments, AreTheSidesOfPolygonsUnderNoise)
 {
+  // Where noise breaks an edge at a corner, its sides end a pixel or two before it.
+  std::size_t found = 0;
+  std::ptrdiff_t right = 0;
   for (std::uint64_t seed = 1; seed <= 10; ++seed)
   {
-    SCOPED_TRACE(seed);
-    expectTrueSegments(detectLineSegments(disturbed(patchesPicture(), 1.0, 0.0, 5.0, seed), LineSegmentParams()), 1.0,
-                       0.2);
+    const Segments segments = detectLineSegments(disturbed(patchesPicture(), 1.0, 0.0, 5.0, seed), LineSegmentParams());
+    found += segments.size();
+    right += countTrueSegments(segments, 1.0, 0.2);
   }
+  const std::size_t all = 10 * trueSegments().size();
+  EXPECT_NEAR(static_cast<double>(found), static_cast<double>(all), 2.0);
+  EXPECT_GE(right, static_cast<std::ptrdiff_t>(all) - 4);
 }
 
 TEST(LineSegments, AreTheSidesOfPolygonsAtACoarseScale)
@@ -193,7 +204,6 @@ TEST(LineSegments, AreTheLongestInOrder)
 
 TEST(LineSegments, FollowACurveClosely)
 {
-  // A chord of a circle is as far from it as length²/8r in its middle.
   for (const double radius : { 20.0, 60.0, 90.0 })
   {
     const Eigen::Vector2d centre(100.3, 99.8);
@@ -202,8 +212,8 @@ TEST(LineSegments, FollowACurveClosely)
     });
     for (const Segment& segment : detectLineSegments(picture, LineSegmentParams()))
     {
-      EXPECT_LT(segment.length() * segment.length() / (8.0 * radius), 1.5) << radius;
       EXPECT_NEAR((segment.start - centre).norm(), radius, 1.5);
+      EXPECT_NEAR((segment.midpoint() - centre).norm(), radius, 0.8);
       EXPECT_NEAR((segment.end - centre).norm(), radius, 1.5);
     }
   }
@@ -217,13 +227,18 @@ TEST(LineSegments, AreDividedWhereThePartsAreMoreSignificant)
   EXPECT_GT(straight.front().length(), 290.0);
   EXPECT_NEAR(straight.front().start.y(), 40.0, 0.25);
   EXPECT_NEAR(straight.front().end.y(), 40.0, 0.25);
+  // Even if it is not, the parts are shorter by more than they are straighter.
+  LineSegmentParams fine;
+  fine.min_deviation = 0.1;
+  EXPECT_EQ(detectLineSegments(wave(0.25), fine).size(), 1U);
   // Five pixels are a curve: its rises and falls, none from one wave to the next.
   const Segments curved = detectLineSegments(wave(5.0), LineSegmentParams());
   EXPECT_GE(curved.size(), 8U);
-  EXPECT_LT(curved.front().length(), 30.0);
+  EXPECT_LT(curved.front().length(), 40.0);
   // Unless such deviations are declared to be noise.
   LineSegmentParams rough;
   rough.min_deviation = 6.0;
+  rough.max_deviation = 6.0;
   EXPECT_EQ(detectLineSegments(wave(5.0), rough).size(), 1U);
 }
 
@@ -348,14 +363,15 @@ TEST(LineSegments, NameAllFaultsOfTheirParameters)
   params.low_threshold = 0.0;
   params.high_threshold = -1.0;
   params.min_deviation = 0.0;
+  params.max_deviation = -1.0;
   params.min_significance = -1.0;
   params.min_length = 0.0;
   params.max_segments = 0;
-  EXPECT_EQ(params.validate().size(), 7U);
+  EXPECT_EQ(params.validate().size(), 8U);
   const double nan = std::numeric_limits<double>::quiet_NaN();
   params.sigma = params.low_threshold = params.high_threshold = nan;
-  params.min_deviation = params.min_significance = params.min_length = nan;
-  EXPECT_EQ(params.validate().size(), 7U);
+  params.min_deviation = params.max_deviation = params.min_significance = params.min_length = nan;
+  EXPECT_EQ(params.validate().size(), 8U);
 }
 
 TEST(SegmentContrast, IsTheLeftSidesMinusTheRightSides)
@@ -371,11 +387,10 @@ TEST(SegmentContrast, LeavesOutWhatIsOutsideTheImage)
 {
   const Segment half_outside = { { -50.0, 30.5 }, { 50.0, 30.5 } };
   EXPECT_NEAR(segmentContrast(brightAbove(), half_outside), 60.0, 1e-9);
-  for (const Segment& segment :
-       { Segment{ { 10.0, 0.0 }, { 60.0, 0.0 } }, Segment{ { 10.0, 79.0 }, { 60.0, 79.0 } },
-         Segment{ { 500.0, 0.0 }, { 560.0, 70.0 } }, Segment{ { 10.0, 10.0 }, { 10.0, 10.0 } },
-         Segment{ { std::numeric_limits<double>::quiet_NaN(), 10.0 }, { 60.0, 10.0 } },
-         Segment{ { 10.0, 10.0 }, { std::numeric_limits<double>::infinity(), 10.0 } } })
+  for (const Segment& segment : { Segment{ { 10.0, 0.0 }, { 60.0, 0.0 } }, Segment{ { 10.0, 79.0 }, { 60.0, 79.0 } },
+                                  Segment{ { 500.0, 0.0 }, { 560.0, 70.0 } }, Segment{ { 10.0, 10.0 }, { 10.0, 10.0 } },
+                                  Segment{ { std::numeric_limits<double>::quiet_NaN(), 10.0 }, { 60.0, 10.0 } },
+                                  Segment{ { 10.0, 10.0 }, { std::numeric_limits<double>::infinity(), 10.0 } } })
   {
     EXPECT_TRUE(std::isnan(segmentContrast(brightAbove(), segment)));
   }

@@ -13,13 +13,15 @@ namespace view_servo
 namespace
 {
 /** What is there is documented in the file: every parameter, with its default. */
-TEST(Config, PointMatcherHasEveryParameterAtItsDefault)
+template <typename Params>
+void expectEveryParameterAtItsDefault(const std::string& file)
 {
-  const YAML::Node config = YAML::LoadFile(CONFIG_DIR "/point_matcher.yaml");
+  SCOPED_TRACE(file);
+  const YAML::Node config = YAML::LoadFile(CONFIG_DIR "/" + file);
   const std::vector<std::string> of_the_node = {
     "view", "rate", "views_dir", "allow_paths", "image_transport", "queue_size", "max_image_age"
   };
-  ViewMatcherParams params;
+  Params params;
   const std::vector<Parameter> table = matcherParameters(params);
   EXPECT_EQ(config.size(), of_the_node.size() + table.size());
   for (const std::string& name : of_the_node)
@@ -33,6 +35,16 @@ TEST(Config, PointMatcherHasEveryParameterAtItsDefault)
     EXPECT_TRUE(parameter.set(config[parameter.name].as<std::string>())) << parameter.name;
     EXPECT_EQ(parameter.get(), standard) << parameter.name;
   }
+}
+
+TEST(Config, PointMatcherHasEveryParameterAtItsDefault)
+{
+  expectEveryParameterAtItsDefault<ViewMatcherParams>("point_matcher.yaml");
+}
+
+TEST(Config, LineMatcherHasEveryParameterAtItsDefault)
+{
+  expectEveryParameterAtItsDefault<LineMatcherParams>("line_matcher.yaml");
 }
 
 }  // namespace

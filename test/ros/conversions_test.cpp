@@ -309,6 +309,34 @@ TEST(MatchConversion, CopiesMatchesAndWritesTheMatrixByRows)
   EXPECT_TRUE(std::isnan(homography.rotation.w));
 }
 
+TEST(MatchConversion, CopiesLinesAndWritesPlanesByRows)
+{
+  const std::vector<MatchedLine> lines = {
+    { { { 1.0, 2.0 }, { 3.0, 4.0 } }, { { 5.0, 6.0 }, { 7.0, 8.0 } }, 11, 12, 0.75, 1 },
+    { { { 0.0, 0.0 }, { 1.0, 0.0 } }, { { 0.0, 1.0 }, { 1.0, 1.0 } }, 13, 14, 0.5, -1 },
+  };
+  const std::vector<LineMatch> messages = toLineMatches(lines);
+  ASSERT_EQ(messages.size(), 2u);
+  EXPECT_EQ(messages[0].reference.x1, 1.0);
+  EXPECT_EQ(messages[0].reference.y1, 2.0);
+  EXPECT_EQ(messages[0].reference.x2, 3.0);
+  EXPECT_EQ(messages[0].reference.y2, 4.0);
+  EXPECT_EQ(messages[0].current.x1, 5.0);
+  EXPECT_EQ(messages[0].current.y1, 6.0);
+  EXPECT_EQ(messages[0].current.x2, 7.0);
+  EXPECT_EQ(messages[0].current.y2, 8.0);
+  EXPECT_EQ(messages[0].score, 0.75);
+  EXPECT_EQ(messages[0].plane, 1);
+  EXPECT_EQ(messages[1].plane, -1);
+
+  Eigen::Matrix3d h;
+  h << 1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0, 8.0, 9.0;
+  const std::vector<double> expected = { 1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0, 8.0, 9.0,
+                                         2.0, 4.0, 6.0, 8.0, 10., 12., 14., 16., 18. };
+  EXPECT_EQ(toRowMajor({ h, 2.0 * h }), expected);
+  EXPECT_TRUE(toRowMajor({}).empty());
+}
+
 TEST(MatchConversion, HasNoNumbersWithoutGeometry)
 {
   ViewMatch match;

@@ -3,6 +3,7 @@
 #include "node_test.h"
 #include "support/temporary_directory.h"
 
+#include "view_servo/LineMatches.h"
 #include "view_servo/ListViews.h"
 #include "view_servo/MatchPoints.h"
 #include "view_servo/PointMatches.h"
@@ -31,6 +32,7 @@ namespace test
 {
 namespace
 {
+const std::string LINE_MATCHER = LINE_MATCHER_PATH;
 const std::string POINT_MATCHER = POINT_MATCHER_PATH;
 const std::string VIEW_STORE = VIEW_STORE_PATH;
 
@@ -123,6 +125,37 @@ protected:
     return directory_.path() / "output";
   }
 
+  /** @param topic where the node publishes what it found in each image. */
+  template <typename Message>
+  void expectToStopAtOnceWhileMatching(const std::string& program, const std::string& topic) const
+  {
+    const std::string name = "stopped_" + topic;
+    const cv::Mat picture = makePicture(1);
+    NodeProcess node(program,
+                     { "__name:=" + name, views(), "_rate:=100.0", "image_raw:=camera/image_raw",
+                       "camera_info:=camera/camera_info", topic + ":=" + name + "/" + topic },
+                     output());
+    ASSERT_TRUE(waitForService(name + "/match")) << node.output();
+    StoredView view;
+    view.name = "wall";
+    view.image = picture;
+    ViewStore(directory_.path() / "views").save(view, true);
+    SetView::Request request;
+    request.view = "wall";
+    SetView::Response response;
+    ASSERT_TRUE(ros::service::call(name + "/set_view", request, response));
+    ASSERT_TRUE(response.success) << response.message;
+
+    const FakeCamera camera("camera");
+    const Recorder<Message> matches(name + "/" + topic);
+    const cv::Mat seen = warped(picture, exampleHomography());
+    ASSERT_TRUE(waitUntil([&] { return matches.last().has_value(); }, [&] { camera.publish(seen, ros::Time::now()); }));
+    const ros::WallTime start = ros::WallTime::now();
+    node.interrupt();
+    EXPECT_EQ(node.exitStatus(), 0) << node.output();
+    EXPECT_LT((ros::WallTime::now() - start).toSec(), 5.0);
+  }
+
   static bool contains(const std::string& text, const std::string& part)
   {
     return text.find(part) != std::string::npos;
@@ -196,6 +229,20 @@ TEST_F(LifecycleTest, RefusesToStartAndListsAllFaults)
   }
 }
 
+TEST_F(LifecycleTest, LineMatcherRefusesToStartAndListsAllFaults)
+{
+  NodeProcess node(LINE_MATCHER,
+                   { "__name:=faulty_lines", views(), "_rate:=0", "_queue_size:=none", "_max_image_age:=-1",
+                     "_segment_min_length:=0", "_detector:=lucky", "_min_plane_lines:=2", "_view:=../x" },
+                   output());
+  EXPECT_EQ(node.exitStatus(), 1);
+  for (const char* name :
+       { "~rate", "~queue_size", "~max_image_age", "segment_min_length", "~detector", "min_plane_lines", "~view" })
+  {
+    EXPECT_TRUE(contains(node.output(), name)) << name << " is missing in\n" << node.output();
+  }
+}
+
 TEST_F(LifecycleTest, WarnsOfMisspeltParameters)
 {
   NodeProcess node(POINT_MATCHER, { "__name:=misspelt", views(), "_max_cornes:=300", "_rte:=3.0" }, output());
@@ -220,32 +267,29 @@ TEST_F(LifecycleTest, ReadsItsParameters)
   EXPECT_FALSE(contains(node.output(), "did you mean")) << node.output();
 }
 
+TEST_F(LifecycleTest, LineMatcherReadsItsParameters)
+{
+  NodeProcess node(LINE_MATCHER,
+                   { "__name:=tuned_lines", views(), "_max_segments:=300", "_seed:=7", "_line_order:=upright",
+                     "_min_quality:=0.25", "_max_segmens:=3" },
+                   output());
+  ASSERT_TRUE(waitForService("tuned_lines/match")) << node.output();
+  for (const char* value :
+       { "max_segments=300", "seed=7", "line_order=upright", "min_quality=0.25", "rate=10", "max_planes=4" })
+  {
+    EXPECT_TRUE(contains(node.output(), value)) << value << " is missing in\n" << node.output();
+  }
+  EXPECT_TRUE(contains(node.output(), "~max_segments?")) << node.output();
+}
+
 TEST_F(LifecycleTest, StopsAtOnceWhileMatching)
 {
-  const cv::Mat picture = makePicture(1);
-  NodeProcess node(POINT_MATCHER,
-                   { "__name:=stopped", views(), "_rate:=100.0", "image_raw:=camera/image_raw",
-                     "camera_info:=camera/camera_info", "point_matches:=stopped/point_matches" },
-                   output());
-  ASSERT_TRUE(waitForService("stopped/match")) << node.output();
-  StoredView view;
-  view.name = "wall";
-  view.image = picture;
-  ViewStore(directory_.path() / "views").save(view, true);
-  SetView::Request request;
-  request.view = "wall";
-  SetView::Response response;
-  ASSERT_TRUE(ros::service::call("stopped/set_view", request, response));
-  ASSERT_TRUE(response.success) << response.message;
+  expectToStopAtOnceWhileMatching<PointMatches>(POINT_MATCHER, "point_matches");
+}
 
-  const FakeCamera camera("camera");
-  const Recorder<PointMatches> matches("stopped/point_matches");
-  const cv::Mat seen = warped(picture, exampleHomography());
-  ASSERT_TRUE(waitUntil([&] { return matches.last().has_value(); }, [&] { camera.publish(seen, ros::Time::now()); }));
-  const ros::WallTime start = ros::WallTime::now();
-  node.interrupt();
-  EXPECT_EQ(node.exitStatus(), 0) << node.output();
-  EXPECT_LT((ros::WallTime::now() - start).toSec(), 5.0);
+TEST_F(LifecycleTest, LineMatcherStopsAtOnceWhileMatching)
+{
+  expectToStopAtOnceWhileMatching<LineMatches>(LINE_MATCHER, "line_matches");
 }
 
 }  // namespace

@@ -24,9 +24,12 @@ cv::Mat drawnPicture(const cv::Size& size, const Scene& grey)
     for (int u = 0; u < size.width; ++u)
     {
       double sum = 0.0;
-      for (int i = 0; i < OVER * OVER; ++i)
+      for (double dv = 0.5 / OVER - 0.5; dv < 0.5; dv += 1.0 / OVER)
       {
-        sum += grey(Eigen::Vector2d(u + (i % OVER + 0.5) / OVER - 0.5, v + (i / OVER + 0.5) / OVER - 0.5));
+        for (double du = 0.5 / OVER - 0.5; du < 0.5; du += 1.0 / OVER)
+        {
+          sum += grey(Eigen::Vector2d(u + du, v + dv));
+        }
       }
       picture.at<unsigned char>(v, u) = static_cast<unsigned char>(std::lround(sum / (OVER * OVER)));
     }

@@ -7,17 +7,28 @@
 #include <set>
 #include <stdexcept>
 #include <string>
+#include <utility>
+#include <vector>
 
 namespace
 {
+using view_servo::LineMatcherParams;
 using view_servo::matcherParameters;
 using view_servo::Parameter;
 using view_servo::setParameter;
 using view_servo::ViewMatcherParams;
 
-TEST(MatcherParameters, HaveUniqueDocumentedNames)
+template <typename Params>
+class MatcherParameters : public ::testing::Test
 {
-  ViewMatcherParams params;
+};
+
+using Matchers = ::testing::Types<ViewMatcherParams, LineMatcherParams>;
+TYPED_TEST_SUITE(MatcherParameters, Matchers, );
+
+TYPED_TEST(MatcherParameters, HaveUniqueDocumentedNames)
+{
+  TypeParam params;
   std::set<std::string> names;
   for (const Parameter& parameter : matcherParameters(params))
   {
@@ -28,9 +39,9 @@ TEST(MatcherParameters, HaveUniqueDocumentedNames)
   EXPECT_GT(names.size(), 30U);
 }
 
-TEST(MatcherParameters, ReadBackWhatTheyPrint)
+TYPED_TEST(MatcherParameters, ReadBackWhatTheyPrint)
 {
-  ViewMatcherParams params;
+  TypeParam params;
   for (const Parameter& parameter : matcherParameters(params))
   {
     const std::string before = parameter.get();
@@ -39,10 +50,10 @@ TEST(MatcherParameters, ReadBackWhatTheyPrint)
   }
 }
 
-TEST(MatcherParameters, EachSetsSomethingOfItsOwn)
+TYPED_TEST(MatcherParameters, EachSetsSomethingOfItsOwn)
 {
   // Another value for each changes what its name reads, and nothing else.
-  ViewMatcherParams params;
+  TypeParam params;
   const auto table = matcherParameters(params);
   for (const Parameter& parameter : table)
   {
@@ -91,6 +102,64 @@ TEST(SetParameter, SetsNumbersWordsAndSwitches)
   EXPECT_FALSE(params.points.cyclic_order);
   EXPECT_EQ(params.points.search.search, view_servo::ProfileSearch::RADIUS);
   EXPECT_EQ(params.seed, 12345678901U);
+}
+
+TEST(SetParameter, SetsThoseOfLines)
+{
+  LineMatcherParams params;
+  setParameter(params, "detector", "lsd");
+  setParameter(params, "line_order", "upright");
+  setParameter(params, "segment_min_length", "20.5");
+  setParameter(params, "region_tolerance", "1.5");
+  setParameter(params, "inlier_threshold", "2.5");
+  EXPECT_EQ(params.segments.detector, view_servo::SegmentDetector::LSD);
+  EXPECT_EQ(params.features.groups.order, view_servo::LineOrder::UPRIGHT);
+  EXPECT_EQ(params.segments.min_length, 20.5);
+  EXPECT_EQ(params.regions.tolerance, 1.5);
+  EXPECT_EQ(params.ransac.inlier_threshold, 2.5);
+  EXPECT_THROW(setParameter(params, "detector", "hough"), std::invalid_argument);
+  EXPECT_THROW(setParameter(params, "max_corners", "100"), std::invalid_argument) << "a parameter of points";
+}
+
+TEST(MatcherParameterFaults, SayTheNamesOfLineParameters)
+{
+  for (const auto& [name, value] : std::vector<std::pair<std::string, std::string>>{ { "edge_sigma", "0.1" },
+                                                                                     { "edge_low_threshold", "0" },
+                                                                                     { "edge_high_threshold", "1" },
+                                                                                     { "segment_deviation", "-1" },
+                                                                                     { "segment_max_deviation", "0.1" },
+                                                                                     { "segment_significance", "-1" },
+                                                                                     { "segment_min_length", "0" },
+                                                                                     { "max_segments", "0" },
+                                                                                     { "group_distance", "0" },
+                                                                                     { "group_collinearity", "-1" },
+                                                                                     { "group_min_angle_deg", "90" },
+                                                                                     { "group_neighbours", "-1" },
+                                                                                     { "group_min_weight", "1" },
+                                                                                     { "max_grouped", "5001" },
+                                                                                     { "neighbours", "5" },
+                                                                                     { "neighbour_pairs", "1" },
+                                                                                     { "max_candidates", "0" },
+                                                                                     { "max_companions", "1" },
+                                                                                     { "max_hypotheses", "0" },
+                                                                                     { "affine_tolerance", "0" },
+                                                                                     { "region_tolerance", "0" },
+                                                                                     { "region_max_angle_deg", "45" },
+                                                                                     { "region_min_support", "0" },
+                                                                                     { "min_correlation", "1" },
+                                                                                     { "min_mean_correlation", "-2" },
+                                                                                     { "inlier_threshold", "0" },
+                                                                                     { "plane_threshold", "0" },
+                                                                                     { "min_plane_lines", "4" },
+                                                                                     { "max_planes", "0" },
+                                                                                     { "min_quality", "1" } })
+  {
+    LineMatcherParams params;
+    setParameter(params, name, value);
+    const std::vector<std::string> faults = params.validate();
+    ASSERT_EQ(faults.size(), 1U) << name;
+    EXPECT_EQ(faults.front().rfind(name + " ", 0), 0U) << name << ": " << faults.front();
+  }
 }
 
 TEST(SetParameter, NamesTheNearestWhenAskedForOneThatIsNot)

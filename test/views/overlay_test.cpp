@@ -10,8 +10,10 @@
 
 using view_servo::drawOverlay;
 using view_servo::GeometryModel;
+using view_servo::MatchedLine;
 using view_servo::MatchOutcome;
 using view_servo::PreparedImage;
+using view_servo::Segment;
 using view_servo::ViewMatch;
 
 namespace
@@ -48,6 +50,11 @@ Eigen::Matrix3d shift(double u, double v)
   h(0, 2) = u;
   h(1, 2) = v;
   return h;
+}
+
+MatchedLine line(const Segment& reference, const Segment& current, int plane = 0)
+{
+  return { reference, current, 0, 0, 0.8, plane };
 }
 
 /** Pixels of an area that are not grey. */
@@ -173,4 +180,96 @@ TEST(Overlay, saysWhatHappened)
   EXPECT_EQ(cv::norm(second.colRange(second.cols - 4, second.cols), cv::NORM_INF),
             cv::norm(second.colRange(0, 4), cv::NORM_INF))
       << "it fits";
+}
+
+TEST(Overlay, drawsBothSegmentsOfAPairInOneColour)
+{
+  ViewMatch match = noMatch();
+  match.lines.push_back(line({ { 50.0, 50.0 }, { 150.0, 50.0 } }, { { 300.0, 60.0 }, { 300.0, 160.0 } }));
+  match.lines.push_back(line({ { 50.0, 150.0 }, { 150.0, 150.0 } }, { { 200.0, 60.0 }, { 200.0, 160.0 } }));
+  const cv::Mat picture = drawOverlay(image(450, 200), image(450, 200), match);
+  const auto colour = [&](int x, int y) {
+    return picture.at<cv::Vec3b>(y, x);
+  };
+  EXPECT_GT(colouredPixels(picture, around(70, 50)), 5);
+  EXPECT_EQ(colour(70, 50), colour(CURRENT_LEFT + 300, 80));
+  EXPECT_EQ(colour(70, 150), colour(CURRENT_LEFT + 200, 80));
+  EXPECT_GT(cv::norm(colour(70, 50), colour(70, 150)), 100.0);
+}
+
+TEST(Overlay, dimsTheImagesUnderSegmentsOnly)
+{
+  ViewMatch match = noMatch();
+  match.lines.push_back(line({ { 50.0, 50.0 }, { 150.0, 50.0 } }, { { 300.0, 60.0 }, { 300.0, 160.0 } }));
+  const cv::Mat picture = drawOverlay(image(450, 200), image(450, 200), match);
+  EXPECT_LT(picture.at<cv::Vec3b>(150, 400)[0], 90);
+  EXPECT_LT(picture.at<cv::Vec3b>(150, CURRENT_LEFT + 50)[0], 90);
+}
+
+TEST(Overlay, numbersSegmentsUnlessTheyAreMany)
+{
+  // The same picture but for what stands beside one segment.
+  const auto pixels_beside = [](std::size_t count) {
+    ViewMatch match = noMatch();
+    match.lines.assign(count, line({ { 50.0, 50.0 }, { 150.0, 50.0 } }, { { 50.0, 50.0 }, { 150.0, 50.0 } }));
+    const cv::Mat picture = drawOverlay(image(450, 200), image(450, 200), match);
+    return colouredPixels(picture, { 50, 54, 100, 20 });
+  };
+  EXPECT_GT(pixels_beside(1), 5);
+  EXPECT_GT(pixels_beside(60), 5);
+  EXPECT_EQ(pixels_beside(61), 0);
+}
+
+TEST(Overlay, tellsPlanesApart)
+{
+  const auto drawn = [](int plane) {
+    ViewMatch match = noMatch();
+    match.lines.push_back(line({ { 50.0, 50.0 }, { 150.0, 50.0 } }, { { 50.0, 50.0 }, { 150.0, 50.0 } }, plane));
+    return drawOverlay(image(450, 200), image(450, 200), match);
+  };
+  const cv::Mat none = drawn(-1);
+  const cv::Mat first = drawn(0);
+  const cv::Mat second = drawn(1);
+  const cv::Mat third = drawn(2);
+  EXPECT_GT(cv::norm(none, first, cv::NORM_INF), 50.0);
+  EXPECT_GT(cv::norm(first, second, cv::NORM_INF), 50.0);
+  EXPECT_GT(cv::norm(second, third, cv::NORM_INF), 50.0);
+}
+
+TEST(Overlay, marksIntersections)
+{
+  ViewMatch match = noMatch();
+  match.lines.push_back(line({ { 50.0, 50.0 }, { 150.0, 50.0 } }, { { 300.0, 60.0 }, { 300.0, 160.0 } }));
+  match.matches.push_back({ { { 200.0, 100.0 }, { 150.0, 120.0 } }, 1.0, true });
+  const cv::Mat picture = drawOverlay(image(450, 200), image(450, 200), match);
+  EXPECT_GT(colouredPixels(picture, around(200, 100)), 3);
+  EXPECT_GT(colouredPixels(picture, around(CURRENT_LEFT + 150, 120)), 3);
+  EXPECT_EQ(colouredPixels(picture, around(400, 110)), 0) << "they are not joined";
+}
+
+TEST(Overlay, clipsSegmentsToTheirImages)
+{
+  ViewMatch match = noMatch();
+  match.lines.push_back(line({ { 400.0, 50.0 }, { 1e6, 50.0 } }, { { -1e6, 100.0 }, { 50.0, 100.0 } }));
+  match.lines.push_back(line({ { -500.0, -500.0 }, { -400.0, -1e6 } }, { { 900.0, 100.0 }, { 1000.0, 900.0 } }));
+  match.matches.push_back({ { { 470.0, 150.0 }, { -20.0, 150.0 } }, 1.0, true });
+  const cv::Mat picture = drawOverlay(image(450, 200), image(450, 200), match);
+  EXPECT_GT(colouredPixels(picture, around(430, 50)), 5);
+  EXPECT_GT(colouredPixels(picture, around(CURRENT_LEFT + 20, 100)), 5);
+  EXPECT_EQ(colouredPixels(picture, { CURRENT_LEFT, 0, 450, 80 }), 0);
+  EXPECT_EQ(colouredPixels(picture, { 0, 80, 450, picture.rows - 80 }), 0);
+}
+
+TEST(Overlay, drawsTheOutlineWhenLinesHaveOnePlane)
+{
+  const cv::Rect region(50, 40, 100, 80);
+  ViewMatch match = matchOf(shift(30.0, 20.0));
+  match.lines.push_back(line({ { 300.0, 50.0 }, { 350.0, 50.0 } }, { { 330.0, 70.0 }, { 380.0, 70.0 } }));
+  for (const std::size_t planes : { 1, 2 })
+  {
+    match.planes.assign(planes, match.matrix);
+    const cv::Mat picture = drawOverlay(image(450, 200, region), image(450, 200), match);
+    const bool drawn = colouredPixels(picture, around(CURRENT_LEFT + 130, 59.5)) > 5;
+    EXPECT_EQ(drawn, planes == 1);
+  }
 }

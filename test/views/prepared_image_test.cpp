@@ -8,7 +8,7 @@
 #include <Eigen/Geometry>
 #include <opencv2/core.hpp>
 
-#include <atomic>
+#include <algorithm>
 #include <cmath>
 #include <stdexcept>
 #include <thread>
@@ -17,8 +17,12 @@
 namespace
 {
 using view_servo::Corner;
+using view_servo::LineFeatureParams;
+using view_servo::LineFeatures;
+using view_servo::LineSegmentParams;
 using view_servo::PointMatcherParams;
 using view_servo::PreparedImage;
+using view_servo::Segment;
 using view_servo::test::texturedPicture;
 
 TEST(PreparedImage, LevelsShrinkByTheRootOfTwoAndMapBack)
@@ -75,6 +79,41 @@ TEST(PreparedImage, LooksForFeaturesInItsRegionOnEveryLevel)
       EXPECT_GE(full.y(), region.y - 3.0);
       EXPECT_LE(full.x(), region.x + region.width + 3.0);
       EXPECT_LE(full.y(), region.y + region.height + 3.0);
+    }
+  }
+}
+
+TEST(PreparedImage, DetectsLinesInItsRegionOnceForAllThreads)
+{
+  const cv::Rect region(100, 60, 220, 200);
+  LineSegmentParams segments;
+  segments.min_length = 20.0;
+  LineFeatureParams lines;
+  lines.max_grouped = 5;
+  const PreparedImage image(texturedPicture(3), region, { segments, lines });
+  std::vector<std::thread> threads;
+  std::vector<const LineFeatures*> seen(4);
+  for (const LineFeatures*& address : seen)
+  {
+    threads.emplace_back([&] { address = &image.lines(); });
+  }
+  for (std::thread& thread : threads)
+  {
+    thread.join();
+  }
+  EXPECT_EQ(std::count(seen.begin(), seen.end(), &image.lines()), 4);
+
+  EXPECT_EQ(image.lines().groupedCount(), 5);
+  ASSERT_GT(image.lines().segments().size(), 10U);
+  for (const Segment& segment : image.lines().segments())
+  {
+    EXPECT_GE(segment.length(), 20.0);
+    for (const Eigen::Vector2d& end : { segment.start, segment.end })
+    {
+      EXPECT_GE(end.x(), region.x - 1.0);
+      EXPECT_GE(end.y(), region.y - 1.0);
+      EXPECT_LE(end.x(), region.x + region.width);
+      EXPECT_LE(end.y(), region.y + region.height);
     }
   }
 }

@@ -3,6 +3,7 @@
 #include "view_servo/views/view_cache.h"
 
 #include "support/temporary_directory.h"
+#include "support/textured_plane.h"
 
 #include <gtest/gtest.h>
 #include <opencv2/core.hpp>
@@ -37,6 +38,18 @@ TEST_F(ViewCacheTest, ReadsAViewOnce)
   EXPECT_EQ(first->grey().at<uchar>(0, 0), 10);
   EXPECT_EQ(first->region(), cv::Rect(8, 8, 32, 32));
   EXPECT_EQ(cache.get("desk"), first);
+}
+
+TEST_F(ViewCacheTest, PreparesViewsAsTold)
+{
+  StoredView view;
+  view.name = "wall";
+  view.image = test::texturedPicture(1);
+  ViewStore(directory_.path()).save(view, true);
+  LineSegmentParams segments;
+  segments.max_segments = 7;
+  ViewCache cache{ ViewStore(directory_.path()), { segments, LineFeatureParams() } };
+  EXPECT_EQ(cache.get("wall")->lines().segments().size(), 7U);
 }
 
 TEST_F(ViewCacheTest, ReadsAViewAgainThatWasSavedAnew)

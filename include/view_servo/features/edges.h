@@ -25,13 +25,14 @@ struct EdgeParams
 /**
  * Points of an edge one after the other, with the brighter side on the left of somebody who walks along them and looks
  * at the image: sub-pixel positions [px], (0, 0) at the centre of the top-left pixel. The last point of a closed edge
- * is its first.
+ * is its first, the one farthest from its middle: on a polygon, a corner.
  */
 using EdgeChain = std::vector<Eigen::Vector2d>;
 
 /**
- * The edges of an image. White noise of deviation s makes gradients of deviation s / (5 sigma^2) in u and in v, which
- * the low threshold should exceed three times.
+ * The edges of an image, but for its outermost two pixels; where several meet, those that do not continue smoothly end.
+ * White noise of deviation s makes gradients of deviation s / (5 sigma²) in u and in v: with a high threshold of four
+ * times that it makes few edges.
  * @param grey 8-bit, one channel.
  * @param region where edges are wanted: those of the whole image, cut off at its limits; empty = everywhere.
  * @throws std::invalid_argument when the image has the wrong type.

@@ -64,6 +64,11 @@ public:
   {
     return segments_[static_cast<std::size_t>(i)];
   }
+  /** Unit vector from a segment's start to its end. */
+  const Eigen::Vector2d& direction(int i) const
+  {
+    return directions_[static_cast<std::size_t>(i)];
+  }
   /** Number of segments that form groups: the first so many. */
   int groupedCount() const
   {
@@ -111,6 +116,7 @@ private:
   LineFeatureParams params_;
   cv::Mat smoothed_;
   Segments segments_;
+  std::vector<Eigen::Vector2d> directions_;
   std::vector<int> input_;
   std::vector<std::vector<int>> near_;
   std::vector<std::vector<Meeting>> meetings_;

@@ -22,6 +22,7 @@ namespace view_servo
 struct LineRegionParams
 {
   int max_candidates = 8;         ///< counterparts tried for a segment, those with most votes, >= 1
+  int max_companions = 32;        ///< matches of neighbours tried with it, those with most votes, >= 2
   int max_hypotheses = 12;        ///< affine maps scored for a candidate, those whose segments agree best, >= 1
   double affine_tolerance = 3.0;  ///< of segments under a local affine map, across [px], > 0
   double tolerance = 2.0;         ///< of segments under a homography, across [px], > 0

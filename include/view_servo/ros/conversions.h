@@ -3,8 +3,11 @@
 #pragma once
 
 #include "view_servo/Homography.h"
+#include "view_servo/LineMatch.h"
+#include "view_servo/LineSegment.h"
 #include "view_servo/PointMatch.h"
 #include "view_servo/geometry/camera.h"
+#include "view_servo/geometry/line_segment.h"
 #include "view_servo/views/view_matcher.h"
 #include "view_servo/views/view_store.h"
 
@@ -53,6 +56,8 @@ ViewPose toViewPose(const geometry_msgs::TransformStamped& transform);
 geometry_msgs::PoseStamped toPoseStamped(const ViewPose& pose, const ros::Time& stamp);
 
 std::vector<PointMatch> toPointMatches(const std::vector<MatchedPoint>& matches);
+LineSegment toLineSegment(const Segment& segment);
+std::vector<LineMatch> toLineMatches(const std::vector<MatchedLine>& lines);
 
 /** Row-major. Messages hold boost::array in some ROS releases and std::array in others. */
 template <typename Array>
@@ -60,6 +65,9 @@ void copyRowMajor(const Eigen::Matrix3d& matrix, Array& array)
 {
   Eigen::Map<Eigen::Matrix<double, 3, 3, Eigen::RowMajor>>(array.data()) = matrix;
 }
+
+/** One after the other, 9 numbers each, row-major. */
+std::vector<double> toRowMajor(const std::vector<Eigen::Matrix3d>& matrices);
 
 /** State TRACKING and valid when `match` found a homography, else SEARCHING; not decomposed. */
 Homography toHomography(const ViewMatch& match, const std::string& view, const std_msgs::Header& header);

@@ -54,7 +54,10 @@ private:
   std::vector<std::string> faults_;
 };
 
-/** Reads the options of view matching (views/matcher_parameters.h) and validates them. */
+/** Reads the options of matching by points (views/matcher_parameters.h) and validates them. */
 ViewMatcherParams readMatcherParams(ParameterReader& reader);
+
+/** Likewise, of matching by lines. */
+LineMatcherParams readLineMatcherParams(ParameterReader& reader);
 
 }  // namespace view_servo

@@ -2,6 +2,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include "view_servo/views/line_view_matcher.h"
 #include "view_servo/views/view_matcher.h"
 
 #include <functional>
@@ -24,8 +25,11 @@ struct Parameter
   std::function<bool(const std::string&)> set;
 };
 
-/** The parameters of view matching, bound to `params`, which must outlive the table. */
+/** The parameters of matching by points, bound to `params`, which must outlive the table. */
 std::vector<Parameter> matcherParameters(ViewMatcherParams& params);
+
+/** The parameters of matching by lines, likewise; which groups to form is chosen for each match instead. */
+std::vector<Parameter> matcherParameters(LineMatcherParams& params);
 
 /** The name in the table that is spelt most like `name`, for messages; empty for an empty table. */
 std::string nearestName(const std::vector<Parameter>& table, const std::string& name);
@@ -33,8 +37,9 @@ std::string nearestName(const std::vector<Parameter>& table, const std::string& 
 /**
  * Sets one parameter by its name.
  * @throws std::invalid_argument naming the parameter when it is unknown (with the nearest name) or the value does not
- * parse; `params` is then unchanged. Ranges are checked by ViewMatcherParams::validate().
+ * parse; `params` is then unchanged. Ranges are checked by the parameters' validate().
  */
 void setParameter(ViewMatcherParams& params, const std::string& name, const std::string& value);
+void setParameter(LineMatcherParams& params, const std::string& name, const std::string& value);
 
 }  // namespace view_servo

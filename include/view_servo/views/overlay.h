@@ -10,8 +10,10 @@ namespace view_servo
 {
 /**
  * A picture of a match, BGR: reference left, current right, inliers joined by lines coloured by their place in the
- * reference, other candidates as small dots; for a homography the outline of the reference's region is drawn in both
- * images. A line of text below says what was found (or why nothing was).
+ * reference, other candidates as small dots. A match of line segments shows them instead, a pair in one colour, up to
+ * sixty with their rank, and their intersections as small dots: those of the first plane are plain, those of the second
+ * carry a bead, of the third two, and those of no plane are thin. For the homography of one plane the outline of the
+ * reference's region is drawn in both images. A line of text below says what was found (or why nothing was).
  */
 cv::Mat drawOverlay(const PreparedImage& reference, const PreparedImage& current, const ViewMatch& match);
 

@@ -2,6 +2,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include "view_servo/features/line_segments.h"
+#include "view_servo/matching/line_features.h"
 #include "view_servo/matching/point_matcher.h"
 
 #include <Eigen/Core>
@@ -14,6 +16,23 @@
 
 namespace view_servo
 {
+/** Options of all that may be asked of an image. Who matches by points only, or by lines only, gives only those. */
+struct FeatureParams
+{
+  FeatureParams() = default;
+  FeatureParams(const PointMatcherParams& point_params) : points(point_params)
+  {
+  }
+  FeatureParams(const LineSegmentParams& segment_params, const LineFeatureParams& line_params)
+    : segments(segment_params), lines(line_params)
+  {
+  }
+
+  PointMatcherParams points;
+  LineSegmentParams segments;
+  LineFeatureParams lines;
+};
+
 /**
  * An image with the features that matching asks for, each computed once, when it is first needed: a stored view that
  * is kept costs nothing for the next live image. Safe to use from several threads.
@@ -31,7 +50,7 @@ public:
    * @param region where features are looked for [px]; empty = everywhere.
    * @throws std::invalid_argument when the image has the wrong type or the region leaves it.
    */
-  PreparedImage(cv::Mat grey, const cv::Rect& region, const PointMatcherParams& params);
+  PreparedImage(cv::Mat grey, const cv::Rect& region, const FeatureParams& params);
 
   const cv::Mat& grey() const
   {
@@ -46,6 +65,9 @@ public:
   const cv::Mat& image(int number) const;
   const PointFeatures& points(int number) const;
   const ProfileIndex& profileIndex(int number) const;
+
+  /** The line segments of the full image, in its region. @throws what detectLineSegments() and LineFeatures throw. */
+  const LineFeatures& lines() const;
 
   /** Maps pixels of a level to pixels of the full image (homogeneous; a scale and a shift). */
   Eigen::Matrix3d toFull(int number) const;
@@ -65,8 +87,10 @@ private:
 
   cv::Mat grey_;
   cv::Rect region_;
-  PointMatcherParams params_;
+  FeatureParams params_;
   mutable std::array<Level, LEVELS> levels_;
+  mutable std::once_flag lines_once_;
+  mutable std::unique_ptr<LineFeatures> lines_;
 };
 
 }  // namespace view_servo

@@ -21,7 +21,7 @@ class ViewCache
 {
 public:
   /** @param capacity views kept, >= 1. */
-  ViewCache(ViewStore store, const PointMatcherParams& params, std::size_t capacity = 4);
+  ViewCache(ViewStore store, const FeatureParams& params, std::size_t capacity = 4);
 
   /** @throws ViewStoreError as ViewStore::load(). */
   std::shared_ptr<const PreparedImage> get(const std::string& name);
@@ -35,7 +35,7 @@ private:
   };
 
   ViewStore store_;
-  PointMatcherParams params_;
+  FeatureParams params_;
   std::size_t capacity_;
   std::mutex mutex_;
   std::list<Entry> entries_;  // used last first

@@ -1,0 +1,287 @@
+// Copyright (c) 2026, the view_servo authors
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include "view_servo/ImageSource.h"
+#include "view_servo/SetView.h"
+#include "view_servo/ros/camera_input.h"
+#include "view_servo/ros/conversions.h"
+#include "view_servo/ros/image_source.h"
+#include "view_servo/ros/node_base.h"
+#include "view_servo/ros/parameters.h"
+#include "view_servo/views/overlay.h"
+#include "view_servo/views/prepared_image.h"
+#include "view_servo/views/view_cache.h"
+#include "view_servo/views/view_matcher.h"
+
+#include <diagnostic_msgs/DiagnosticStatus.h>
+#include <diagnostic_updater/DiagnosticStatusWrapper.h>
+#include <image_transport/image_transport.h>
+#include <ros/publisher.h>
+#include <sensor_msgs/image_encodings.h>
+#include <std_msgs/Header.h>
+#include <opencv2/core/types.hpp>
+
+#include <chrono>
+#include <condition_variable>
+#include <exception>
+#include <memory>
+#include <mutex>
+#include <optional>
+#include <string>
+#include <thread>
+
+namespace view_servo
+{
+/** Parameters of a StreamingMatcher besides those of its way of matching. */
+struct StreamingMatcherParams
+{
+  CameraInputParams camera;
+  ImageSourceParams sources;
+  std::string view;
+  double rate;
+
+  static StreamingMatcherParams read(ParameterReader& reader, double default_rate);
+};
+
+/**
+ * A node that matches images: two given ones on request, and, when a view is set, each camera image with that stored
+ * view. Parameters, all private:
+ *  - `~view` (string, default ""): stored view that camera images are matched with; "" = none;
+ *  - `~rate` (double, default Matching::RATE [Hz], >= 0.001): camera images are matched at most this often;
+ *  - `~views_dir`, `~allow_paths`: see ImageSourceReader;
+ *  - `~image_transport`, `~queue_size`, `~max_image_age`: see CameraInput;
+ *  - those of Matching.
+ *
+ * Camera images are matched by a thread of the node's own, which always takes the newest: matching takes longer than
+ * the time between two images, and in a subscriber's callback they would queue up and grow old. For the same reason it
+ * rests while nobody listens. Its clock is steady, so that neither a paused nor a looping bag changes its pace.
+ *
+ * `Matching` is the way of matching. It has
+ *  - `Service`, whose request has reference, query and overlay, whose response success, message, elapsed_ms and
+ *    overlay; `Options`, what else a request may ask for, which by default is what camera images get; `Message`, which
+ *    is published on `TOPIC`; the default `RATE` [Hz];
+ *  - `static Params readParams(ParameterReader&)`, a constructor that takes those, and `FeatureParams features() const`;
+ *  - `static void clear(Service::Response&)`, which sets what a refused request leaves unknown;
+ *  - `static Options options(const Service::Request&)`, which throws when the request makes no sense;
+ *  - `ViewMatch match(const PreparedImage& reference, const PreparedImage& current, const Options&) const`;
+ *  - `static void fill(const ViewMatch&, Service::Response&)`, for the fields that are the service's own;
+ *  - `static Message toMessage(const ViewMatch&, const std::string& view, const std_msgs::Header&)`.
+ */
+template <typename Matching>
+class StreamingMatcher : private NodeBase
+{
+public:
+  /** @throws std::invalid_argument listing all faults of the parameters. */
+  StreamingMatcher(const ros::NodeHandle& nh, const ros::NodeHandle& private_nh)
+    : StreamingMatcher(nh, private_nh, Params::read(private_nh))
+  {
+  }
+
+  ~StreamingMatcher()
+  {
+    {
+      const std::lock_guard<std::mutex> lock(mutex_);
+      stopping_ = true;
+    }
+    wake_.notify_all();
+    worker_.join();
+  }
+
+private:
+  using Service = typename Matching::Service;
+
+  struct Params
+  {
+    StreamingMatcherParams node;
+    typename Matching::Params matching;
+
+    static Params read(const ros::NodeHandle& private_nh)
+    {
+      ParameterReader reader(private_nh);
+      Params params{ StreamingMatcherParams::read(reader, Matching::RATE), Matching::readParams(reader) };
+      reader.finish();
+      return params;
+    }
+  };
+
+  /** What came of an image, for diagnostics. */
+  struct Result
+  {
+    bool failed = false;
+    std::string text = "no image was matched";
+  };
+
+  StreamingMatcher(const ros::NodeHandle& nh, const ros::NodeHandle& private_nh, const Params& params)
+    : NodeBase(nh, private_nh),
+      rate_(params.node.rate),
+      matching_(params.matching),
+      features_(matching_.features()),
+      view_(params.node.view),
+      camera_(nh, params.node.camera, [this](const CameraFrame& frame) { take(frame); }),
+      sources_(params.node.sources, camera_),
+      views_(sources_.store(), features_),
+      transport_(nh)
+  {
+    matches_publisher_ = nh_.advertise<typename Matching::Message>(Matching::TOPIC, 1);
+    overlay_publisher_ = transport_.advertise("overlay", 1);
+    match_service_ = serve("match", &StreamingMatcher::match, this);
+    set_view_service_ = serve("set_view", &StreamingMatcher::setView, this);
+    diagnostics_.add("camera", &camera_, &CameraInput::diagnose);
+    diagnostics_.add("matching", this, &StreamingMatcher::diagnose);
+    ROS_INFO_STREAM("stored views are in " << sources_.store().directory());
+    worker_ = std::thread([this] { work(); });
+  }
+
+  void match(const typename Service::Request& request, typename Service::Response& response)
+  {
+    Matching::clear(response);
+    const typename Matching::Options options = Matching::options(request);
+    std_msgs::Header header;
+    const std::shared_ptr<const PreparedImage> reference = prepare(request.reference, "reference", header);
+    const std::shared_ptr<const PreparedImage> query = prepare(request.query, "query", header);
+    const ViewMatch result = matching_.match(*reference, *query, options);
+
+    if (request.overlay)
+    {
+      response.overlay = overlay(*reference, *query, result, header);
+    }
+    response.success = result.outcome == MatchOutcome::MATCHED;
+    response.message = result.message;
+    response.elapsed_ms = result.elapsed_ms;
+    Matching::fill(result, response);
+  }
+
+  /** The image of a request; a stored view comes from the cache, with what was computed for it before. */
+  std::shared_ptr<const PreparedImage> prepare(const ImageSource& source, const std::string& name,
+                                               std_msgs::Header& header)
+  {
+    if (kindOf(source, name) == SourceKind::VIEW)
+    {
+      header = std_msgs::Header();
+      return views_.get(source.view);
+    }
+    const SourcedImage image = sources_.read(source, name);
+    header = image.header;
+    return std::make_shared<const PreparedImage>(image.grey, image.region, features_);
+  }
+
+  static sensor_msgs::Image overlay(const PreparedImage& reference, const PreparedImage& current,
+                                    const ViewMatch& result, const std_msgs::Header& header)
+  {
+    return toImage(drawOverlay(reference, current, result), sensor_msgs::image_encodings::BGR8, header);
+  }
+
+  void setView(const SetView::Request& request, SetView::Response& response)
+  {
+    if (!request.view.empty())
+    {
+      views_.get(request.view);
+    }
+    {
+      const std::lock_guard<std::mutex> lock(mutex_);
+      view_ = request.view;
+      last_result_ = Result();
+    }
+    response.success = true;
+    response.message = request.view.empty() ? "camera images are not matched"
+                                            : "camera images are matched with view '" + request.view + "'";
+    ROS_INFO_STREAM(response.message);
+  }
+
+  void take(const CameraFrame& frame)
+  {
+    {
+      const std::lock_guard<std::mutex> lock(mutex_);
+      newest_ = frame;
+    }
+    wake_.notify_all();
+  }
+
+  void work()
+  {
+    using Clock = std::chrono::steady_clock;
+    const auto period = std::chrono::duration_cast<Clock::duration>(std::chrono::duration<double>(1.0 / rate_));
+    std::unique_lock<std::mutex> lock(mutex_);
+    while (!stopping_)
+    {
+      wake_.wait(lock, [this] { return stopping_ || (newest_.has_value() && !view_.empty()); });
+      if (stopping_)
+      {
+        break;
+      }
+      const CameraFrame frame = *newest_;
+      newest_.reset();
+      const std::string view = view_;
+      const Clock::time_point next = Clock::now() + period;
+      lock.unlock();
+      const Result result = matchFrame(frame, view);
+      lock.lock();
+      if (view == view_)
+      {
+        last_result_ = result;
+      }
+      wake_.wait_until(lock, next, [this] { return stopping_; });
+    }
+  }
+
+  Result matchFrame(const CameraFrame& frame, const std::string& view)
+  {
+    const bool wants_overlay = overlay_publisher_.getNumSubscribers() > 0;
+    if (!wants_overlay && matches_publisher_.getNumSubscribers() == 0)
+    {
+      return { false, "nobody listens" };
+    }
+    try
+    {
+      const std_msgs::Header& header = frame.image->header;
+      const std::shared_ptr<const PreparedImage> reference = views_.get(view);
+      const PreparedImage current(toGrey(*frame.image, camera_.imageTopic()), cv::Rect(), features_);
+      const ViewMatch result = matching_.match(*reference, current, typename Matching::Options());
+      matches_publisher_.publish(Matching::toMessage(result, view, header));
+      if (wants_overlay)
+      {
+        overlay_publisher_.publish(overlay(*reference, current, result, header));
+      }
+      return { false, result.message };
+    }
+    catch (const std::exception& error)
+    {
+      const std::string text = oneLine(error);
+      ROS_ERROR_STREAM_THROTTLE(10.0, text);
+      return { true, text };
+    }
+  }
+
+  void diagnose(diagnostic_updater::DiagnosticStatusWrapper& status)
+  {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    const unsigned char level =
+        last_result_.failed ? diagnostic_msgs::DiagnosticStatus::ERROR : diagnostic_msgs::DiagnosticStatus::OK;
+    status.summary(level, view_.empty() ? "no view is set" : last_result_.text);
+    status.add("View", view_);
+  }
+
+  const double rate_;
+  const Matching matching_;
+  const FeatureParams features_;
+
+  std::mutex mutex_;  // guards what follows
+  std::condition_variable wake_;
+  std::string view_;
+  std::optional<CameraFrame> newest_;
+  Result last_result_;
+  bool stopping_ = false;
+
+  CameraInput camera_;
+  ImageSourceReader sources_;
+  ViewCache views_;
+  image_transport::ImageTransport transport_;
+  ros::Publisher matches_publisher_;
+  image_transport::Publisher overlay_publisher_;
+  ros::ServiceServer match_service_;
+  ros::ServiceServer set_view_service_;
+  std::thread worker_;
+};
+
+}  // namespace view_servo

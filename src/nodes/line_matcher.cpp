@@ -1,0 +1,134 @@
+// Copyright (c) 2026, the view_servo authors
+// SPDX-License-Identifier: BSD-3-Clause
+#include "view_servo/LineMatches.h"
+#include "view_servo/MatchLines.h"
+#include "view_servo/ros/conversions.h"
+#include "view_servo/ros/node_base.h"
+#include "view_servo/ros/parameters.h"
+#include "view_servo/ros/streaming_matcher.h"
+#include "view_servo/views/line_view_matcher.h"
+
+#include <chrono>
+#include <limits>
+#include <stdexcept>
+#include <string>
+
+namespace view_servo
+{
+namespace
+{
+LineGrouping toGrouping(const std::string& name)
+{
+  if (name.empty() || name == "triplets")
+  {
+    return LineGrouping::TRIPLETS;
+  }
+  if (name == "pairs")
+  {
+    return LineGrouping::PAIRS;
+  }
+  throw std::invalid_argument("groups: '" + name + "' is neither triplets nor pairs");
+}
+
+/** By lines, as a StreamingMatcher wants it. */
+class LineMatching
+{
+public:
+  using Params = LineMatcherParams;
+  using Service = MatchLines;
+  using Message = LineMatches;
+  struct Options
+  {
+    LineGrouping groups = LineGrouping::TRIPLETS;
+  };
+
+  static constexpr const char* TOPIC = "line_matches";
+  static constexpr double RATE = 10.0;  // [Hz]
+
+  static Params readParams(ParameterReader& reader)
+  {
+    return readLineMatcherParams(reader);
+  }
+
+  explicit LineMatching(const Params& params) : matcher_(params)
+  {
+  }
+
+  FeatureParams features() const
+  {
+    return { matcher_.params().segments, matcher_.params().features };
+  }
+
+  static void clear(Service::Response& response)
+  {
+    copyRowMajor(Eigen::Matrix3d::Constant(std::numeric_limits<double>::quiet_NaN()), response.fundamental);
+  }
+
+  static Options options(const Service::Request& request)
+  {
+    return { toGrouping(request.groups) };
+  }
+
+  ViewMatch match(const PreparedImage& reference, const PreparedImage& current, const Options& options) const
+  {
+    using Clock = std::chrono::steady_clock;
+    const Clock::time_point start = Clock::now();
+    ViewMatch result = matcher_.match(reference.lines(), current.lines(), GeometryModel::HOMOGRAPHY, options.groups);
+    result.elapsed_ms = std::chrono::duration<double, std::milli>(Clock::now() - start).count();  // with the detection
+    return result;
+  }
+
+  static void fill(const ViewMatch& result, Service::Response& response)
+  {
+    response.matches = toLineMatches(result.lines);
+    response.points = toPointMatches(result.matches);
+    response.plane_homographies = toRowMajor(result.planes);
+    copyRowMajor(result.fundamental, response.fundamental);
+  }
+
+  static Message toMessage(const ViewMatch& result, const std::string& view, const std_msgs::Header& header)
+  {
+    Message message;
+    message.header = header;
+    message.view = view;
+    message.matches = toLineMatches(result.lines);
+    message.points = toPointMatches(result.matches);
+    return message;
+  }
+
+private:
+  LineViewMatcher matcher_;
+};
+
+}  // namespace
+
+/**
+ * Matches images by the structure of groups of their line segments: two given ones on request, and, when a view is set,
+ * each camera image with that stored view.
+ *
+ * Parameters, all private; config/line_matcher.yaml has them with their ranges:
+ *  - `~view`, `~rate` (default 10.0 [Hz]), `~views_dir`, `~allow_paths`, `~image_transport`, `~queue_size`,
+ *    `~max_image_age`: see StreamingMatcher;
+ *  - those of the matcher, see matcherParameters().
+ *
+ * Subscribes:
+ *  - `image_raw` (sensor_msgs/Image), `camera_info` (sensor_msgs/CameraInfo).
+ *
+ * Publishes:
+ *  - `line_matches` (view_servo/LineMatches): for each image matched, with the image's header; nothing when the view
+ *    cannot be read or the camera is not calibrated;
+ *  - `overlay` (sensor_msgs/Image, bgr8): reference and image side by side; drawn when somebody listens;
+ *  - `/diagnostics` (diagnostic_msgs/DiagnosticArray): 1 Hz, camera and matching.
+ *
+ * Services:
+ *  - `~match` (view_servo/MatchLines): matches two images;
+ *  - `~set_view` (view_servo/SetView): sets or, with "", unsets the view; refused when it cannot be read.
+ */
+using LineMatcherNode = StreamingMatcher<LineMatching>;
+
+}  // namespace view_servo
+
+int main(int argc, char** argv)
+{
+  return view_servo::runNode<view_servo::LineMatcherNode>(argc, argv, "line_matcher");
+}

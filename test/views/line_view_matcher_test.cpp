@@ -1,0 +1,304 @@
+// Copyright (c) 2026, the view_servo authors
+// SPDX-License-Identifier: BSD-3-Clause
+#include "view_servo/views/line_view_matcher.h"
+
+#include "support/textured_plane.h"
+#include "view_servo/geometry/fundamental.h"
+#include "view_servo/geometry/line_homography.h"
+
+#include <gtest/gtest.h>
+#include <Eigen/Geometry>
+#include <Eigen/LU>
+#include <opencv2/core.hpp>
+#include <opencv2/core/eigen.hpp>
+#include <opencv2/imgproc.hpp>
+
+#include <algorithm>
+#include <cmath>
+#include <random>
+#include <set>
+#include <stdexcept>
+
+namespace view_servo
+{
+namespace
+{
+const cv::Size SIZE(640, 480);
+
+double uniform(std::mt19937_64& rng, double low, double high)
+{
+  return low + (high - low) * static_cast<double>(rng() >> 11) * 0x1.0p-53;
+}
+
+LineFeatures features(const cv::Mat& image, const LineMatcherParams& params)
+{
+  return { image, detectLineSegments(image, params.segments), params.features };
+}
+
+cv::Mat warped(const cv::Mat& image, const Eigen::Matrix3d& h)
+{
+  cv::Mat matrix;
+  cv::eigen2cv(h, matrix);
+  cv::Mat result;
+  cv::warpPerspective(image, result, matrix, image.size(), cv::INTER_CUBIC, cv::BORDER_CONSTANT, cv::Scalar(110));
+  return result;
+}
+
+ViewMatch match(const cv::Mat& reference, const cv::Mat& current, GeometryModel model = GeometryModel::HOMOGRAPHY,
+                LineGrouping groups = LineGrouping::TRIPLETS)
+{
+  const LineMatcherParams params;
+  return LineViewMatcher(params).match(features(reference, params), features(current, params), model, groups);
+}
+
+int correct(const ViewMatch& result, const Eigen::Matrix3d& h)
+{
+  return static_cast<int>(std::count_if(result.lines.begin(), result.lines.end(), [&](const MatchedLine& line) {
+    const auto mapped = transfer(h, line.reference);
+    return mapped && compare(*mapped, line.current).distance < 2.0;
+  }));
+}
+
+double cornerError(const Eigen::Matrix3d& a, const Eigen::Matrix3d& b)
+{
+  double sum = 0.0;
+  for (const Eigen::Vector2d& corner :
+       { Eigen::Vector2d(0, 0), { SIZE.width - 1, 0 }, { 0, SIZE.height - 1 }, { SIZE.width - 1, SIZE.height - 1 } })
+  {
+    sum += ((a * corner.homogeneous()).hnormalized() - (b * corner.homogeneous()).hnormalized()).norm() / 4.0;
+  }
+  return sum;
+}
+
+/** Two walls that meet in the upright line u = 320 of the reference, each with its texture: a corner of a room. */
+struct RoomCorner
+{
+  cv::Mat reference;
+  cv::Mat current;
+  Eigen::Matrix3d left;   ///< homography of the left wall, reference -> current
+  Eigen::Matrix3d right;  ///< and of the right one
+  Eigen::Matrix3d f;
+
+  RoomCorner()
+  {
+    Eigen::Matrix3d k;
+    k << 500.0, 0.0, 319.5, 0.0, 500.0, 239.5, 0.0, 0.0, 1.0;
+    // Walls at 45 degrees to the optical axis that meet 4 m ahead.
+    const Eigen::Vector3d n_left(-std::sqrt(0.5), 0.0, std::sqrt(0.5));
+    const Eigen::Vector3d n_right(std::sqrt(0.5), 0.0, std::sqrt(0.5));
+    const double d = 4.0 * std::sqrt(0.5);
+    const Eigen::Matrix3d r = Eigen::AngleAxisd(0.15, Eigen::Vector3d::UnitY()).toRotationMatrix();
+    const Eigen::Vector3d t(-0.6, 0.1, 0.2);
+    left = k * (r + t * n_left.transpose() / d) * k.inverse();
+    right = k * (r + t * n_right.transpose() / d) * k.inverse();
+    Eigen::Matrix3d cross;
+    cross << 0.0, -t.z(), t.y(), t.z(), 0.0, -t.x(), -t.y(), t.x(), 0.0;
+    f = k.inverse().transpose() * cross * r * k.inverse();
+
+    const cv::Mat texture_left = test::texturedPicture(21, SIZE);
+    const cv::Mat texture_right = test::texturedPicture(22, SIZE);
+    reference = texture_left.clone();
+    const cv::Rect half(SIZE.width / 2, 0, SIZE.width / 2, SIZE.height);
+    texture_right(half).copyTo(reference(half));
+    cv::Mat mask(SIZE, CV_8UC1, cv::Scalar(0));
+    mask(half).setTo(255);
+    cv::Mat seen_mask;
+    cv::Mat matrix;
+    cv::eigen2cv(right, matrix);
+    cv::warpPerspective(mask, seen_mask, matrix, SIZE, cv::INTER_NEAREST);
+    current = warped(texture_left, left);
+    warped(texture_right, right).copyTo(current, seen_mask);
+  }
+};
+
+}  // namespace
+
+class RolledPlane : public testing::TestWithParam<double>
+{
+};
+
+TEST_P(RolledPlane, IsMatched)
+{
+  // A plane from another side, and turned about the optical axis.
+  const double roll = GetParam() * M_PI / 180.0;
+  Eigen::Matrix3d about_middle = Eigen::Matrix3d::Identity();
+  about_middle.topLeftCorner<2, 2>() = Eigen::Rotation2Dd(roll).toRotationMatrix();
+  const Eigen::Vector2d middle(0.5 * (SIZE.width - 1), 0.5 * (SIZE.height - 1));
+  about_middle.topRightCorner<2, 1>() = middle - about_middle.topLeftCorner<2, 2>() * middle;
+  const Eigen::Matrix3d h = about_middle * test::exampleHomography();
+  const cv::Mat reference = test::texturedPicture(5, SIZE);
+  const ViewMatch result = match(reference, warped(reference, h));
+  ASSERT_EQ(result.outcome, MatchOutcome::MATCHED) << result.message;
+  EXPECT_GE(result.lines.size(), 40U);
+  EXPECT_GE(correct(result, h), static_cast<int>(0.9 * static_cast<double>(result.lines.size())));
+  EXPECT_LT(cornerError(result.matrix, h), 3.0);
+  EXPECT_EQ(result.planes.size(), 1U);
+  EXPECT_TRUE(result.fundamental.hasNaN()) << "one plane leaves F open";
+}
+
+INSTANTIATE_TEST_SUITE_P(Degrees, RolledPlane, testing::Values(0.0, 30.0, 90.0, 180.0));
+
+TEST(LineViewMatcher, PairsOfSegmentsMatchToo)
+{
+  const Eigen::Matrix3d h = test::exampleHomography();
+  const cv::Mat reference = test::texturedPicture(6, SIZE);
+  const ViewMatch result = match(reference, warped(reference, h), GeometryModel::HOMOGRAPHY, LineGrouping::PAIRS);
+  ASSERT_EQ(result.outcome, MatchOutcome::MATCHED) << result.message;
+  EXPECT_GE(correct(result, h), 30);
+}
+
+TEST(LineViewMatcher, FindsTwoPlanesOfARoomCorner)
+{
+  const RoomCorner room;
+  const ViewMatch result = match(room.reference, room.current, GeometryModel::FUNDAMENTAL);
+  ASSERT_EQ(result.outcome, MatchOutcome::MATCHED) << result.message;
+  ASSERT_GE(result.planes.size(), 2U);
+  // Each of the walls is one of the first two planes, and its lines are on it.
+  for (const bool is_left : { true, false })
+  {
+    const Eigen::Matrix3d& truth = is_left ? room.left : room.right;
+    const auto error = [&](std::size_t plane) {
+      double sum = 0.0;
+      int count = 0;
+      for (const MatchedLine& line : result.lines)
+      {
+        if ((line.reference.midpoint().x() < SIZE.width / 2.0) == is_left && line.plane == static_cast<int>(plane))
+        {
+          const Eigen::Vector2d at = line.reference.midpoint();
+          sum += ((truth * at.homogeneous()).hnormalized() - (result.planes[plane] * at.homogeneous()).hnormalized())
+                     .norm();
+          ++count;
+        }
+      }
+      return count < 8 ? 1e9 : sum / count;
+    };
+    EXPECT_LT(std::min(error(0), error(1)), 1.5);
+  }
+  // The epipolar geometry holds where nothing was matched, too.
+  double sum = 0.0;
+  int count = 0;
+  for (int u = 40; u < SIZE.width; u += 40)
+  {
+    for (int v = 40; v < SIZE.height; v += 40)
+    {
+      const Eigen::Vector2d at(u, v);
+      const Eigen::Matrix3d& h = u < SIZE.width / 2 ? room.left : room.right;
+      sum += std::sqrt(sampsonError(result.fundamental, { at, (h * at.homogeneous()).hnormalized() }));
+      ++count;
+    }
+  }
+  EXPECT_LT(sum / count, 1.5);
+}
+
+TEST(LineViewMatcher, DifferentScenesDoNotMatch)
+{
+  for (int seed = 30; seed < 36; ++seed)
+  {
+    const ViewMatch result = match(test::texturedPicture(static_cast<std::uint64_t>(seed), SIZE),
+                                   test::texturedPicture(static_cast<std::uint64_t>(seed + 100), SIZE));
+    EXPECT_NE(result.outcome, MatchOutcome::MATCHED) << result.message;
+    EXPECT_LE(result.lines.size(), 6U);
+    EXPECT_TRUE(result.matrix.hasNaN());
+    EXPECT_FALSE(result.message.empty());
+  }
+}
+
+TEST(LineViewMatcher, NamesTooFewSegments)
+{
+  const cv::Mat blank(SIZE, CV_8UC1, cv::Scalar(128));
+  cv::Mat one = blank.clone();
+  one(cv::Rect(200, 0, 300, SIZE.height)).setTo(60);
+  const cv::Mat scene = test::texturedPicture(5, SIZE);
+  for (const cv::Mat& poor : { blank, one })
+  {
+    for (const bool first : { true, false })
+    {
+      const ViewMatch result = first ? match(poor, scene) : match(scene, poor);
+      EXPECT_EQ(result.outcome, MatchOutcome::TOO_FEW_FEATURES);
+      EXPECT_NE(result.message.find("too few line segments"), std::string::npos);
+      EXPECT_TRUE(result.lines.empty());
+    }
+  }
+}
+
+TEST(LineViewMatcher, IndicesAreThoseOfTheSegmentsGiven)
+{
+  const LineMatcherParams params;
+  const Eigen::Matrix3d h = test::exampleHomography();
+  const cv::Mat reference = test::texturedPicture(7, SIZE);
+  const cv::Mat current = warped(reference, h);
+  Segments from = detectLineSegments(reference, params.segments);
+  Segments to = detectLineSegments(current, params.segments);
+  std::mt19937_64 rng(2);
+  std::shuffle(from.begin(), from.end(), rng);
+  std::shuffle(to.begin(), to.end(), rng);
+  const ViewMatch result = LineViewMatcher(params).match(LineFeatures(reference, from, params.features),
+                                                         LineFeatures(current, to, params.features),
+                                                         GeometryModel::HOMOGRAPHY, LineGrouping::TRIPLETS);
+  ASSERT_FALSE(result.lines.empty());
+  std::set<int> references;
+  std::set<int> currents;
+  for (std::size_t i = 0; i < result.lines.size(); ++i)
+  {
+    const MatchedLine& line = result.lines[i];
+    EXPECT_EQ(line.reference.start, from[static_cast<std::size_t>(line.reference_index)].start);
+    EXPECT_EQ(line.current.end, to[static_cast<std::size_t>(line.current_index)].end);
+    EXPECT_TRUE(references.insert(line.reference_index).second);
+    EXPECT_TRUE(currents.insert(line.current_index).second);
+    EXPECT_TRUE(i == 0 || result.lines[i - 1].score >= line.score);
+  }
+}
+
+TEST(LineViewMatcher, FiveThousandSegmentsAreAnswered)
+{
+  // Segments anywhere, also outside the image: nothing to find, in bounded time and memory.
+  const LineMatcherParams params;
+  const cv::Mat image = test::texturedPicture(9, SIZE);
+  std::mt19937_64 rng(12);
+  const auto random = [&] {
+    Segments segments;
+    for (int i = 0; i < 5000; ++i)
+    {
+      const Eigen::Vector2d start(uniform(rng, -50.0, 700.0), uniform(rng, -50.0, 550.0));
+      const double angle = uniform(rng, -M_PI, M_PI);
+      segments.push_back(
+          { start, start + uniform(rng, 5.0, 40.0) * Eigen::Vector2d(std::cos(angle), std::sin(angle)) });
+    }
+    return LineFeatures(image, directedByContrast(image, segments), params.features);
+  };
+  const ViewMatch result =
+      LineViewMatcher(params).match(random(), random(), GeometryModel::HOMOGRAPHY, LineGrouping::TRIPLETS);
+  EXPECT_NE(result.outcome, MatchOutcome::MATCHED) << result.message;
+}
+
+TEST(LineViewMatcher, SameInputSameResult)
+{
+  const cv::Mat reference = test::texturedPicture(8, SIZE);
+  const cv::Mat current = warped(reference, test::exampleHomography());
+  const ViewMatch first = match(reference, current);
+  const ViewMatch second = match(reference, current);
+  ASSERT_EQ(first.lines.size(), second.lines.size());
+  EXPECT_EQ(first.matrix, second.matrix);
+  for (std::size_t i = 0; i < first.lines.size(); ++i)
+  {
+    EXPECT_EQ(first.lines[i].reference_index, second.lines[i].reference_index);
+    EXPECT_EQ(first.lines[i].current_index, second.lines[i].current_index);
+  }
+}
+
+TEST(LineViewMatcher, NamesAllFaultsOfItsParameters)
+{
+  LineMatcherParams params;
+  params.plane_threshold = 0.0;
+  params.min_plane_lines = 4;
+  params.max_planes = 0;
+  params.min_quality = 1.0;
+  params.regions.max_candidates = 0;
+  params.regions.max_companions = 1;
+  params.regions.max_hypotheses = 0;
+  params.features.neighbours = 5;
+  EXPECT_EQ(params.validate().size(), 8U);
+  EXPECT_THROW(LineViewMatcher{ params }, std::invalid_argument);
+}
+
+}  // namespace view_servo
