@@ -74,12 +74,23 @@ public:
                                                                                                        : 0.0;
   }
 
+  /** From start to end [px]. */
+  const Eigen::Vector2d& along() const
+  {
+    return along_;
+  }
+  /** Component of along() in the direction of a segment that agrees, at least [px]. */
+  double least() const
+  {
+    return least_;
+  }
+
 private:
   const Segment segment_;
   const double tolerance_;
   const double min_cosine_;
   const Eigen::Vector2d along_;
-  const double least_;  // component of along_ in the direction of one that agrees
+  const double least_;
   const Eigen::Array2d low_;
   const Eigen::Array2d high_;
 };
@@ -189,7 +200,8 @@ public:
     const std::vector<Association> candidates = rankedCandidates();
     std::vector<char> claimed(from_.segments().size(), 0);
     std::vector<LineRegion> regions;
-    for (std::size_t next = 0; next < candidates.size();)
+    int trials = 0;
+    for (std::size_t next = 0; next < candidates.size() && trials < params_.max_trials;)
     {
       std::vector<Association> batch;
       for (; next < candidates.size() && batch.size() < BATCH; ++next)
@@ -199,6 +211,7 @@ public:
           batch.push_back(candidates[next]);
         }
       }
+      trials += static_cast<int>(batch.size());
       std::vector<std::optional<LineRegion>> seeds(batch.size());
       cv::parallel_for_(cv::Range(0, static_cast<int>(batch.size())), [&](const cv::Range& range) {
         for (int i = range.start; i < range.end; ++i)
@@ -418,20 +431,46 @@ private:
     return { apply(reference(i).start), apply(reference(i).end) };
   }
 
-  /** Support of an affine map among the neighbours of a candidate. */
-  double localSupport(const Association& candidate, const Eigen::Matrix3d& map) const
+  /** The neighbours of a current segment with their directions, side by side: most tests of agreement end with these. */
+  struct CurrentNeighbours
   {
-    const std::vector<int>& near = to_.near(candidate.column);
-    std::vector<char> used(near.size(), 0);
+    const std::vector<int>& indices;
+    Eigen::ArrayXd u;
+    Eigen::ArrayXd v;
+
+    CurrentNeighbours(const LineFeatures& features, int segment)
+      : indices(features.near(segment)),
+        u(static_cast<Eigen::Index>(indices.size())),
+        v(static_cast<Eigen::Index>(indices.size()))
+    {
+      for (std::size_t k = 0; k < indices.size(); ++k)
+      {
+        u(static_cast<Eigen::Index>(k)) = features.direction(indices[k]).x();
+        v(static_cast<Eigen::Index>(k)) = features.direction(indices[k]).y();
+      }
+    }
+  };
+
+  /** Support of an affine map among the neighbours of a candidate. */
+  double localSupport(const Association& candidate, const CurrentNeighbours& near, const Eigen::Matrix3d& map) const
+  {
+    std::vector<char> used(near.indices.size(), 0);
+    Eigen::ArrayXd along(near.u.size());
     double sum = 0.0;
     for (const int i : from_.near(candidate.row))
     {
       const Probe probe(mapped(map, i), params_.affine_tolerance, min_cosine_);
+      along = probe.along().x() * near.u + probe.along().y() * near.v;
       double best = 0.0;
       std::size_t which = 0;
-      for (std::size_t k = 0; k < near.size(); ++k)
+      for (std::size_t k = 0; k < near.indices.size(); ++k)
       {
-        const double share = used[k] == 0 ? probe.agreement(current(near[k]), to_.direction(near[k])) : 0.0;
+        if (along(static_cast<Eigen::Index>(k)) < probe.least() || used[k] != 0)
+        {
+          continue;
+        }
+        const int index = near.indices[k];
+        const double share = probe.agreement(current(index), to_.direction(index));
         if (share > best)
         {
           best = share;
@@ -471,9 +510,10 @@ private:
     constexpr double WORTH_REFINING = 0.6;  // of the support asked for
     double best = WORTH_REFINING * params_.min_support;
     const Hypothesis* chosen = nullptr;
+    const CurrentNeighbours near_current(to_, candidate.column);
     for (const Hypothesis& tried : hypotheses)
     {
-      const double sum = localSupport(candidate, tried.map);
+      const double sum = localSupport(candidate, near_current, tried.map);
       if (sum > best)
       {
         best = sum;
@@ -605,6 +645,10 @@ std::vector<std::string> LineRegionParams::validate() const
   if (max_candidates < 1)
   {
     faults.emplace_back("max_candidates must be at least 1");
+  }
+  if (max_trials < 1)
+  {
+    faults.emplace_back("max_trials must be at least 1");
   }
   if (max_companions < 2)
   {

@@ -12,6 +12,7 @@
 
 #include <Eigen/Geometry>
 #include <Eigen/LU>
+#include <opencv2/core/utility.hpp>
 
 #include <algorithm>
 #include <cmath>
@@ -441,11 +442,15 @@ ViewMatch LineViewMatcher::match(const LineFeatures& reference, const LineFeatur
   StageClock clock(result.stages);
 
   Attempt attempt(reference, current, params_);
-  const LineIndex& reference_index = reference.index(groups);
-  clock.finish("reference");
-  const LineIndex& current_index = current.index(groups);
-  clock.finish("current");
-  const AssociationMatrix association = associateLines(reference_index, current_index);
+  // Side by side; that of a stored reference is there already.
+  cv::parallel_for_(cv::Range(0, 2), [&](const cv::Range& range) {
+    for (int i = range.start; i < range.end; ++i)
+    {
+      (i == 0 ? reference : current).index(groups);
+    }
+  });
+  clock.finish("groups");
+  const AssociationMatrix association = associateLines(reference.index(groups), current.index(groups));
   clock.finish("association");
   attempt.findRegions(association);
   clock.finish("regions");

@@ -271,6 +271,7 @@ std::vector<Parameter> matcherParameters(LineMatcherParams& params)
     integer("neighbours", features.neighbours, "nearest segments of each that judge a hypothesis, 6 to 1000"),
     integer("neighbour_pairs", features.neighbour_pairs, "nearest segments of each that make one, 2 to 100"),
     integer("max_candidates", regions.max_candidates, "counterparts tried for a segment, those with most votes, >= 1"),
+    integer("max_trials", regions.max_trials, "counterparts tried in all, those first that stand out most, >= 1"),
     integer("max_companions", regions.max_companions,
             "matches of neighbours tried with it, those with most votes, >= 2"),
     integer("max_hypotheses", regions.max_hypotheses, "affine maps tried for a counterpart, >= 1"),

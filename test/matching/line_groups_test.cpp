@@ -2,6 +2,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "view_servo/matching/line_groups.h"
 
+#include "support/synthetic_scene.h"  // seeds RapidCheck
+
 #include <gtest/gtest.h>
 #include <rapidcheck/gtest.h>
 #include <Eigen/Geometry>

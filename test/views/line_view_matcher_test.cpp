@@ -294,10 +294,11 @@ TEST(LineViewMatcher, NamesAllFaultsOfItsParameters)
   params.max_planes = 0;
   params.min_quality = 1.0;
   params.regions.max_candidates = 0;
+  params.regions.max_trials = 0;
   params.regions.max_companions = 1;
   params.regions.max_hypotheses = 0;
   params.features.neighbours = 5;
-  EXPECT_EQ(params.validate().size(), 8U);
+  EXPECT_EQ(params.validate().size(), 9U);
   EXPECT_THROW(LineViewMatcher{ params }, std::invalid_argument);
 }
 

@@ -140,6 +140,7 @@ TEST(MatcherParameterFaults, SayTheNamesOfLineParameters)
                                                                                      { "neighbours", "5" },
                                                                                      { "neighbour_pairs", "1" },
                                                                                      { "max_candidates", "0" },
+                                                                                     { "max_trials", "0" },
                                                                                      { "max_companions", "1" },
                                                                                      { "max_hypotheses", "0" },
                                                                                      { "affine_tolerance", "0" },

@@ -22,8 +22,9 @@ namespace view_servo
 struct LineRegionParams
 {
   int max_candidates = 8;         ///< counterparts tried for a segment, those with most votes, >= 1
-  int max_companions = 32;        ///< matches of neighbours tried with it, those with most votes, >= 2
-  int max_hypotheses = 12;        ///< affine maps scored for a candidate, those whose segments agree best, >= 1
+  int max_trials = 600;           ///< candidates tried in all, those first that stand out most, >= 1
+  int max_companions = 20;        ///< matches of neighbours tried with it, those with most votes, >= 2
+  int max_hypotheses = 8;         ///< affine maps scored for a candidate, those whose segments agree best, >= 1
   double affine_tolerance = 3.0;  ///< of segments under a local affine map, across [px], > 0
   double tolerance = 2.0;         ///< of segments under a homography, across [px], > 0
   double max_angle_deg = 10.0;    ///< between a segment and its counterpart, (0, 45)
@@ -72,7 +73,7 @@ double sideCorrelation(const cv::Mat& reference, const cv::Mat& current, const E
  * Regions, in the order they were found (strongest votes first). Each candidate match is tried with those neighbours
  * that meet its segments alike: three lines give an affine map, the segments around say how good it is, and a map with
  * enough support becomes a homography that grows outwards as long as segments agree. A segment that is in a region
- * starts none. Time is bounded by the number of associations: seeds x max_candidates x max_hypotheses.
+ * starts none. Time is bounded by max_trials x (max_companions² / 2 + max_hypotheses x neighbours²).
  */
 std::vector<LineRegion> findLineRegions(const LineFeatures& reference, const LineFeatures& current,
                                         const AssociationMatrix& association, const LineRegionParams& params);
