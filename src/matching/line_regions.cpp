@@ -2,10 +2,10 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "view_servo/matching/line_regions.h"
 
-#include "view_servo/geometry/homography.h"
 #include "view_servo/geometry/line_homography.h"
 #include "view_servo/matching/line_groups.h"
 
+#include <Eigen/Geometry>
 #include <Eigen/LU>
 #include <opencv2/core.hpp>
 
@@ -738,6 +738,13 @@ double sideCorrelation(const cv::Mat& reference, const cv::Mat& current, const E
   const double first = std::clamp((std::clamp(start, 0.0, length) - start) / (end - start), 0.0, 1.0);
   const double last = std::clamp((std::clamp(end, 0.0, length) - start) / (end - start), 0.0, 1.0);
 
+  // The homography is linear in the samples' homogeneous coordinates.
+  const Eigen::Vector2d along = reference_segment.end - reference_segment.start;
+  const Eigen::Vector2d normal = reference_segment.normal();
+  const Eigen::Vector3d start_there = h * reference_segment.start.homogeneous();
+  const Eigen::Vector3d along_there = h.leftCols<2>() * along;
+  const Eigen::Vector3d normal_there = h.leftCols<2>() * normal;
+
   double best = -1.0;
   for (const double side : { -1.0, 1.0 })
   {
@@ -750,13 +757,15 @@ double sideCorrelation(const cv::Mat& reference, const cv::Mat& current, const E
     for (int i = 0; i < ALONG; ++i)
     {
       const double fraction = first + (last - first) * (i + 0.5) / ALONG;
-      const Eigen::Vector2d on_line =
-          reference_segment.start + fraction * (reference_segment.end - reference_segment.start);
+      const Eigen::Vector2d on_line = reference_segment.start + fraction * along;
+      const Eigen::Vector3d on_line_there = start_there + fraction * along_there;
       for (int j = 0; j < ACROSS; ++j)
       {
-        const Eigen::Vector2d at = on_line + side * (FIRST + STEP * j) * reference_segment.normal();
-        const Eigen::Vector2d there = transfer(h, at);
-        if (!isInside(reference, at) || !isInside(current, there))
+        const double offset = side * (FIRST + STEP * j);
+        const Eigen::Vector2d at = on_line + offset * normal;
+        const Eigen::Vector3d seen = on_line_there + offset * normal_there;
+        const Eigen::Vector2d there = seen.hnormalized();
+        if (!(seen.z() > 0.0) || !isInside(reference, at) || !isInside(current, there))
         {
           continue;
         }
