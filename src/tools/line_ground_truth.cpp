@@ -120,6 +120,7 @@ std::vector<LinePair> readBenchmarkPairs(const fs::path& data, const std::vector
   }
   std::sort(folders.begin(), folders.end());
   std::vector<LinePair> pairs;
+  pairs.reserve(folders.size());
   for (const fs::path& folder : folders)
   {
     pairs.push_back(readBenchmarkPair(folder));
