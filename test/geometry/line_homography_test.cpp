@@ -2,6 +2,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "view_servo/geometry/line_homography.h"
 
+#include "support/synthetic_scene.h"
 #include "view_servo/robust/line_homography_estimator.h"
 #include "view_servo/robust/ransac.h"
 
@@ -18,10 +19,7 @@ namespace view_servo
 {
 namespace
 {
-double uniform(std::mt19937_64& rng, double low, double high)
-{
-  return low + (high - low) * static_cast<double>(rng() >> 11) * 0x1.0p-53;
-}
+using test::uniform;
 
 Eigen::Matrix3d exampleHomography()
 {

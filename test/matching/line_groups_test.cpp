@@ -22,13 +22,9 @@ namespace view_servo
 {
 namespace
 {
-constexpr double COLLINEARITY = 1e-6;  // for exact constructions [px]
+using test::uniform;
 
-/** Uniform in [low, high); the same on every machine. */
-double uniform(std::mt19937_64& rng, double low, double high)
-{
-  return low + (high - low) * static_cast<double>(rng() >> 11) * 0x1.0p-53;
-}
+constexpr double COLLINEARITY = 1e-6;  // for exact constructions [px]
 
 Segments randomSegments(std::mt19937_64& rng, int count)
 {

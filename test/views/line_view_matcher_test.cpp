@@ -2,6 +2,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "view_servo/views/line_view_matcher.h"
 
+#include "support/synthetic_scene.h"
 #include "support/textured_plane.h"
 #include "view_servo/geometry/fundamental.h"
 #include "view_servo/geometry/line_homography.h"
@@ -23,12 +24,9 @@ namespace view_servo
 {
 namespace
 {
-const cv::Size SIZE(640, 480);
+using test::uniform;
 
-double uniform(std::mt19937_64& rng, double low, double high)
-{
-  return low + (high - low) * static_cast<double>(rng() >> 11) * 0x1.0p-53;
-}
+const cv::Size SIZE(640, 480);
 
 LineFeatures features(const cv::Mat& image, const LineMatcherParams& params)
 {

@@ -3,6 +3,7 @@
 #pragma once
 
 #include "view_servo/geometry/line_homography.h"
+#include "view_servo/robust/homography_estimator.h"
 
 #include <optional>
 #include <vector>
@@ -17,12 +18,7 @@ namespace view_servo
 class LineHomographyEstimator
 {
 public:
-  /** A homography with its inverse, so that scoring many segments inverts once. */
-  struct Model
-  {
-    Eigen::Matrix3d h;
-    Eigen::Matrix3d h_inverse;
-  };
+  using Model = HomographyEstimator::Model;
   static constexpr int SAMPLE_SIZE = 4;
 
   /** Keeps a reference to `pairs`, which must outlive the estimator. */
