@@ -5,6 +5,7 @@
 #include "view_servo/ros/conversions.h"
 
 #include <gtest/gtest.h>
+#include <ros/callback_queue.h>
 #include <ros/ros.h>
 #include <sensor_msgs/CameraInfo.h>
 #include <sensor_msgs/Image.h>
@@ -49,7 +50,7 @@ inline bool waitUntil(const std::function<bool()>& predicate, const std::functio
     {
       return true;
     }
-    ros::WallDuration(0.02).sleep();
+    ros::getGlobalCallbackQueue()->callAvailable(ros::WallDuration(0.02));  // returns as soon as a message is there
   }
   return false;
 }
