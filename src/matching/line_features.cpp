@@ -9,6 +9,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstddef>
+#include <limits>
 #include <numeric>
 #include <stdexcept>
 #include <utility>
@@ -41,6 +43,12 @@ double distanceBetween(const Segment& a, const Segment& b)
   }
   return std::min({ distanceToPoint(a, b.start), distanceToPoint(a, b.end), distanceToPoint(b, a.start),
                     distanceToPoint(b, a.end) });
+}
+
+/** The least and the largest offset of a segment's points in a direction [px]. */
+std::pair<double, double> offsets(const Eigen::Vector2d& direction, const Segment& segment)
+{
+  return std::minmax({ direction.dot(segment.start), direction.dot(segment.end) });
 }
 
 }  // namespace
@@ -88,10 +96,7 @@ LineFeatures::LineFeatures(const cv::Mat& grey, Segments segments, const LineFea
   }
 
   const int n = static_cast<int>(segments_.size());
-  for (int i = 0; i < n; ++i)
-  {
-    bins_[static_cast<std::size_t>(directionBin(segment(i)))].push_back(i);
-  }
+  fillDirectionBins();
   const std::size_t count = static_cast<std::size_t>(std::min(n, params_.max_grouped));
   near_.resize(count);
   meetings_.resize(count);
@@ -137,11 +142,56 @@ const LineIndex& LineFeatures::index(LineGrouping groups) const
   return wanted.index;
 }
 
-int LineFeatures::directionBin(const Segment& segment)
+void LineFeatures::fillDirectionBins()
 {
-  const Eigen::Vector2d d = segment.end - segment.start;
-  const double turns = std::atan2(d.y(), d.x()) / (2.0 * M_PI) + 0.5;
-  return static_cast<int>(turns * DIRECTION_BINS) % DIRECTION_BINS;
+  for (int bin = 0; bin < DIRECTIONS; ++bin)
+  {
+    const double angle = (bin + 0.5) / DIRECTIONS * 2.0 * M_PI - M_PI;
+    bins_[static_cast<std::size_t>(bin)].across = { -std::sin(angle), std::cos(angle) };
+  }
+  for (int i = 0; i < static_cast<int>(segments_.size()); ++i)
+  {
+    bins_[static_cast<std::size_t>(directionBin(direction(i)))].segments.push_back(i);
+  }
+  for (DirectionBin& bin : bins_)
+  {
+    const auto low = [&](int i) {
+      return offsets(bin.across, segment(i)).first;
+    };
+    std::stable_sort(bin.segments.begin(), bin.segments.end(), [&](int a, int b) { return low(a) < low(b); });
+    double high = -std::numeric_limits<double>::infinity();
+    for (const int i : bin.segments)
+    {
+      high = std::max(high, offsets(bin.across, segment(i)).second);
+      bin.low.push_back(low(i));
+      bin.high_here.push_back(high);
+    }
+  }
+}
+
+void LineFeatures::alongside(const Segment& segment, double tolerance, double max_angle_deg,
+                             std::vector<int>& found) const
+{
+  found.clear();
+  const int reach = static_cast<int>(std::ceil(max_angle_deg * DIRECTIONS / 360.0));
+  const int middle = directionBin(segment.end - segment.start);
+  for (int offset = -reach; offset <= reach; ++offset)
+  {
+    const DirectionBin& bin = bins_[static_cast<std::size_t>((middle + offset + DIRECTIONS) % DIRECTIONS)];
+    const auto [low, high] = offsets(bin.across, segment);
+    const auto first = std::lower_bound(bin.high_here.begin(), bin.high_here.end(), low - tolerance);
+    const auto last = std::upper_bound(bin.low.begin(), bin.low.end(), high + tolerance);
+    for (std::ptrdiff_t i = first - bin.high_here.begin(); i < last - bin.low.begin(); ++i)
+    {
+      found.push_back(bin.segments[static_cast<std::size_t>(i)]);
+    }
+  }
+}
+
+int LineFeatures::directionBin(const Eigen::Vector2d& direction)
+{
+  const double turns = std::atan2(direction.y(), direction.x()) / (2.0 * M_PI) + 0.5;
+  return static_cast<int>(turns * DIRECTIONS) % DIRECTIONS;
 }
 
 }  // namespace view_servo

@@ -240,6 +240,13 @@ public:
     return regions;
   }
 
+  std::optional<LineRegion> grown(const Eigen::Matrix3d& h, const std::vector<SegmentMatch>& matches) const
+  {
+    LineRegion region{ h, matches, 0.0 };
+    grow(region);
+    return looksAlike(region) ? std::optional<LineRegion>(std::move(region)) : std::nullopt;
+  }
+
 private:
   /** Candidate matches, those first that stand out in their row and column. */
   std::vector<Association> rankedCandidates() const
@@ -431,61 +438,6 @@ private:
     return { apply(reference(i).start), apply(reference(i).end) };
   }
 
-  /** The neighbours of a current segment with their directions, side by side: most tests of agreement end with these. */
-  struct CurrentNeighbours
-  {
-    const std::vector<int>& indices;
-    Eigen::ArrayXd u;
-    Eigen::ArrayXd v;
-
-    CurrentNeighbours(const LineFeatures& features, int segment)
-      : indices(features.near(segment)),
-        u(static_cast<Eigen::Index>(indices.size())),
-        v(static_cast<Eigen::Index>(indices.size()))
-    {
-      for (std::size_t k = 0; k < indices.size(); ++k)
-      {
-        u(static_cast<Eigen::Index>(k)) = features.direction(indices[k]).x();
-        v(static_cast<Eigen::Index>(k)) = features.direction(indices[k]).y();
-      }
-    }
-  };
-
-  /** Support of an affine map among the neighbours of a candidate. */
-  double localSupport(const Association& candidate, const CurrentNeighbours& near, const Eigen::Matrix3d& map) const
-  {
-    std::vector<char> used(near.indices.size(), 0);
-    Eigen::ArrayXd along(near.u.size());
-    double sum = 0.0;
-    for (const int i : from_.near(candidate.row))
-    {
-      const Probe probe(mapped(map, i), params_.affine_tolerance, min_cosine_);
-      along = probe.along().x() * near.u + probe.along().y() * near.v;
-      double best = 0.0;
-      std::size_t which = 0;
-      for (std::size_t k = 0; k < near.indices.size(); ++k)
-      {
-        if (along(static_cast<Eigen::Index>(k)) < probe.least() || used[k] != 0)
-        {
-          continue;
-        }
-        const int index = near.indices[k];
-        const double share = probe.agreement(current(index), to_.direction(index));
-        if (share > best)
-        {
-          best = share;
-          which = k;
-        }
-      }
-      if (best > 0.0)
-      {
-        used[which] = 1;
-        sum += supportOf(best);
-      }
-    }
-    return sum;
-  }
-
   /** The best map of a candidate as a region of its neighbourhood; empty without enough support. */
   std::optional<LineRegion> seed(const Association& candidate) const
   {
@@ -508,25 +460,23 @@ private:
       hypotheses.resize(static_cast<std::size_t>(params_.max_hypotheses));
     }
     constexpr double WORTH_REFINING = 0.6;  // of the support asked for
-    double best = WORTH_REFINING * params_.min_support;
-    const Hypothesis* chosen = nullptr;
-    const CurrentNeighbours near_current(to_, candidate.column);
+    std::vector<int> near = from_.near(candidate.row);
+    near.push_back(candidate.row);
+    LineRegion region{ {}, {}, WORTH_REFINING * params_.min_support };
     for (const Hypothesis& tried : hypotheses)
     {
-      const double sum = localSupport(candidate, near_current, tried.map);
-      if (sum > best)
+      std::vector<SegmentMatch> matches = agreeing(near, tried.map, params_.affine_tolerance);
+      const double sum = support(matches);
+      if (sum > region.support)
       {
-        best = sum;
-        chosen = &tried;
+        region = { tried.map, std::move(matches), sum };
       }
     }
-    if (chosen == nullptr)
+    if (region.matches.empty())
     {
       return std::nullopt;
     }
-    std::vector<int> near = from_.near(candidate.row);
-    near.push_back(candidate.row);
-    LineRegion region{ chosen->map, agreeing(near, chosen->map, params_.affine_tolerance), 0.0 };
+    region.support = 0.0;  // at the tolerance of homographies
     for (int round = 0; round < 3; ++round)
     {
       if (!refit(region, near))
@@ -690,8 +640,8 @@ std::vector<SegmentMatch> agreeingSegments(const Segments& reference, const std:
                                            double max_angle_deg)
 {
   const double min_cosine = std::cos(max_angle_deg * M_PI / 180.0);
-  const int reach = static_cast<int>(std::ceil(max_angle_deg * LineFeatures::DIRECTION_BINS / 360.0));
   std::vector<SegmentMatch> found;
+  std::vector<int> candidates;
   for (const int i : of)
   {
     const auto mapped = transfer(h, reference[static_cast<std::size_t>(i)]);
@@ -700,16 +650,13 @@ std::vector<SegmentMatch> agreeingSegments(const Segments& reference, const std:
       continue;
     }
     const Probe probe(*mapped, tolerance, min_cosine);
-    const int bin = LineFeatures::directionBin(*mapped);
-    for (int offset = -reach; offset <= reach; ++offset)
+    current.alongside(*mapped, tolerance, max_angle_deg, candidates);
+    for (const int k : candidates)
     {
-      for (const int k : current.inDirection(bin + offset))
+      const double share = probe.agreement(current.segment(k), current.direction(k));
+      if (share > 0.0)
       {
-        const double share = probe.agreement(current.segment(k), current.direction(k));
-        if (share > 0.0)
-        {
-          found.push_back({ i, k, share });
-        }
+        found.push_back({ i, k, share });
       }
     }
   }
@@ -794,6 +741,13 @@ std::vector<LineRegion> findLineRegions(const LineFeatures& reference, const Lin
                                         const AssociationMatrix& association, const LineRegionParams& params)
 {
   return RegionFinder(reference, current, association, params).find();
+}
+
+std::optional<LineRegion> growLineRegion(const LineFeatures& reference, const LineFeatures& current,
+                                         const Eigen::Matrix3d& h, const std::vector<SegmentMatch>& matches,
+                                         const LineRegionParams& params)
+{
+  return RegionFinder(reference, current, AssociationMatrix(), params).grown(h, matches);
 }
 
 }  // namespace view_servo

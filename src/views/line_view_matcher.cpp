@@ -17,6 +17,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
+#include <iterator>
 #include <limits>
 #include <optional>
 #include <stdexcept>
@@ -61,35 +62,41 @@ public:
   void findRegions(const AssociationMatrix& association)
   {
     std::vector<LineRegion> all = findLineRegions(from_, to_, association, params_.regions);
-    std::stable_sort(all.begin(), all.end(),
-                     [](const LineRegion& a, const LineRegion& b) { return a.support > b.support; });
+    std::stable_sort(all.begin(), all.end(), hasMoreSupport);
     if (all.empty() || all.front().support < BEYOND_CHANCE)
     {
       return;
     }
-    std::vector<char> reference_used(from_.segments().size(), 0);
-    std::vector<char> current_used(to_.segments().size(), 0);
+    consolidate(all);
+    constexpr int NONE = -1;
+    std::vector<int> of_reference(from_.segments().size(), NONE);
+    std::vector<int> of_current(to_.segments().size(), NONE);
     for (LineRegion& region : all)
     {
       std::vector<SegmentMatch> fresh;
+      std::size_t contradictions = 0;
       for (const SegmentMatch& match : region.matches)
       {
-        if (reference_used[static_cast<std::size_t>(match.reference)] == 0 &&
-            current_used[static_cast<std::size_t>(match.current)] == 0 && quality(match) >= params_.min_quality &&
-            !isBetterExplained(match))
+        const int current = of_reference[static_cast<std::size_t>(match.reference)];
+        const int reference = of_current[static_cast<std::size_t>(match.current)];
+        if (current != NONE || reference != NONE)
+        {
+          contradictions += current != match.current ? 1 : 0;
+        }
+        else if (quality(match) >= params_.min_quality && !isBetterExplained(match))
         {
           fresh.push_back(match);
         }
       }
       constexpr std::size_t MIN_FRESH = 4;
-      if (fresh.size() < MIN_FRESH)
+      if (fresh.size() < std::max(MIN_FRESH, contradictions))
       {
         continue;
       }
       for (const SegmentMatch& match : fresh)
       {
-        reference_used[static_cast<std::size_t>(match.reference)] = 1;
-        current_used[static_cast<std::size_t>(match.current)] = 1;
+        of_reference[static_cast<std::size_t>(match.reference)] = match.current;
+        of_current[static_cast<std::size_t>(match.current)] = match.reference;
       }
       region.matches = std::move(fresh);
       regions_.push_back(std::move(region));
@@ -189,6 +196,83 @@ public:
   }
 
 private:
+  static bool hasMoreSupport(const LineRegion& a, const LineRegion& b)
+  {
+    return a.support > b.support;
+  }
+
+  /**
+   * Several regions may have grown on one plane, each bent by its own wrong matches. Those of all regions that lie near
+   * what the best ones say are searched for a homography, from which another region grows.
+   */
+  void consolidate(std::vector<LineRegion>& regions)
+  {
+    constexpr std::size_t BEST = 3;
+    constexpr double NEAR = 4.0;  // tolerances
+    constexpr std::size_t MIN_LINES = 8;
+    RansacParams ransac_params = params_.ransac;
+    ransac_params.inlier_threshold = params_.plane_threshold;
+    ransac_params.sampling = Sampling::UNIFORM;
+    ransac_params.max_iterations = std::min(ransac_params.max_iterations, 200);
+    const double min_cosine = std::cos(params_.regions.max_angle_deg * M_PI / 180.0);
+    // Each match once.
+    std::vector<SegmentMatch> all;
+    for (const LineRegion& region : regions)
+    {
+      all.insert(all.end(), region.matches.begin(), region.matches.end());
+    }
+    const auto place = [](const SegmentMatch& match) {
+      return std::pair(match.reference, match.current);
+    };
+    std::stable_sort(all.begin(), all.end(),
+                     [&](const SegmentMatch& a, const SegmentMatch& b) { return place(a) < place(b); });
+    all.erase(std::unique(all.begin(), all.end(),
+                          [&](const SegmentMatch& a, const SegmentMatch& b) { return place(a) == place(b); }),
+              all.end());
+
+    std::vector<LineRegion> grown;
+    for (std::size_t i = 0; i < std::min(BEST, regions.size()); ++i)
+    {
+      std::vector<SegmentMatch> near;
+      SegmentPairs lines;
+      for (const SegmentMatch& match : all)
+      {
+        const SegmentPair pair{ from_.segment(match.reference), to_.segment(match.current) };
+        const auto mapped = transfer(regions[i].h, pair.reference);
+        if (!mapped)
+        {
+          continue;
+        }
+        const SegmentAgreement found = compare(*mapped, pair.current);
+        if (found.distance <= NEAR * params_.regions.tolerance && found.cosine >= min_cosine)
+        {
+          near.push_back(match);
+          lines.push_back(pair);
+        }
+      }
+      if (lines.size() < MIN_LINES)
+      {
+        continue;
+      }
+      const auto found = ransac(LineHomographyEstimator(lines), ransac_params, rng_);
+      if (!found.model)
+      {
+        continue;
+      }
+      std::vector<SegmentMatch> inliers;
+      for (const int k : found.inliers)
+      {
+        inliers.push_back(near[static_cast<std::size_t>(k)]);
+      }
+      if (auto region = growLineRegion(from_, to_, found.model->h, inliers, params_.regions))
+      {
+        grown.push_back(std::move(*region));
+      }
+    }
+    regions.insert(regions.end(), std::make_move_iterator(grown.begin()), std::make_move_iterator(grown.end()));
+    std::stable_sort(regions.begin(), regions.end(), hasMoreSupport);
+  }
+
   Correspondence midpoint(const LineRegion& region, const SegmentMatch& match) const
   {
     const Eigen::Vector2d at = from_.segment(match.reference).midpoint();

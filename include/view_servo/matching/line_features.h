@@ -97,16 +97,27 @@ public:
   /** The groups of the grouped segments; computed when first asked for. */
   const LineIndex& index(LineGrouping groups) const;
 
-  static constexpr int DIRECTION_BINS = 36;
-  /** Which part of the circle a segment points to, [0, DIRECTION_BINS). */
-  static int directionBin(const Segment& segment);
-  /** All segments whose direction falls in a bin; bins are counted around the circle. */
-  const std::vector<int>& inDirection(int bin) const
-  {
-    return bins_[static_cast<std::size_t>((bin % DIRECTION_BINS + DIRECTION_BINS) % DIRECTION_BINS)];
-  }
+  /**
+   * Puts all segments into `found` that may lie beside a segment and point the same way, and few others: within
+   * `tolerance` [px] across and within `max_angle_deg` < 90.
+   */
+  void alongside(const Segment& segment, double tolerance, double max_angle_deg, std::vector<int>& found) const;
 
 private:
+  static constexpr int DIRECTIONS = 36;
+
+  /** Segments of about one direction, ordered across it. */
+  struct DirectionBin
+  {
+    Eigen::Vector2d across;         ///< unit vector
+    std::vector<int> segments;      ///< by their least offset across
+    std::vector<double> low;        ///< of each that offset [px]
+    std::vector<double> high_here;  ///< largest offset of a segment up to each [px]
+  };
+
+  static int directionBin(const Eigen::Vector2d& direction);
+  void fillDirectionBins();
+
   struct Groups
   {
     std::once_flag once;
@@ -120,7 +131,7 @@ private:
   std::vector<int> input_;
   std::vector<std::vector<int>> near_;
   std::vector<std::vector<Meeting>> meetings_;
-  std::array<std::vector<int>, DIRECTION_BINS> bins_;
+  std::array<DirectionBin, DIRECTIONS> bins_;
   std::unique_ptr<std::array<Groups, 2>> groups_;
 };
 

@@ -9,6 +9,7 @@
 #include <Eigen/Core>
 #include <opencv2/core/mat.hpp>
 
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -23,8 +24,8 @@ struct LineRegionParams
 {
   int max_candidates = 8;         ///< counterparts tried for a segment, those with most votes, >= 1
   int max_trials = 600;           ///< candidates tried in all, those first that stand out most, >= 1
-  int max_companions = 20;        ///< matches of neighbours tried with it, those with most votes, >= 2
-  int max_hypotheses = 8;         ///< affine maps scored for a candidate, those whose segments agree best, >= 1
+  int max_companions = 12;        ///< matches of neighbours tried with it, those with most votes, >= 2
+  int max_hypotheses = 3;         ///< affine maps scored for a candidate, those whose segments agree best, >= 1
   double affine_tolerance = 3.0;  ///< of segments under a local affine map, across [px], > 0
   double tolerance = 2.0;         ///< of segments under a homography, across [px], > 0
   double max_angle_deg = 10.0;    ///< between a segment and its counterpart, (0, 45)
@@ -77,5 +78,13 @@ double sideCorrelation(const cv::Mat& reference, const cv::Mat& current, const E
  */
 std::vector<LineRegion> findLineRegions(const LineFeatures& reference, const LineFeatures& current,
                                         const AssociationMatrix& association, const LineRegionParams& params);
+
+/**
+ * The region that grows from a homography and the matches, at least three, that gave it; empty when what lies beside
+ * its segments does not look alike.
+ */
+std::optional<LineRegion> growLineRegion(const LineFeatures& reference, const LineFeatures& current,
+                                         const Eigen::Matrix3d& h, const std::vector<SegmentMatch>& matches,
+                                         const LineRegionParams& params);
 
 }  // namespace view_servo
