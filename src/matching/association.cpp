@@ -36,7 +36,8 @@ AssociationMatrix::AssociationMatrix(int rows, int columns, std::vector<Associat
   {
     std::stable_sort(entries.begin(), entries.end(), placeLess);
   }
-  entries_.reserve(entries.size());
+  // In place: what is kept never overtakes what is read.
+  std::size_t kept = 0;
   for (std::size_t i = 0; i < entries.size();)
   {
     Association sum = entries[i];
@@ -46,9 +47,12 @@ AssociationMatrix::AssociationMatrix(int rows, int columns, std::vector<Associat
     }
     if (sum.weight > 0.0)
     {
-      entries_.push_back(sum);
+      entries[kept] = sum;
+      ++kept;
     }
   }
+  entries.resize(kept);
+  entries_ = std::move(entries);
   row_begin_.assign(static_cast<std::size_t>(rows) + 1, 0);
   for (const Association& entry : entries_)
   {
@@ -80,9 +84,12 @@ AssociationMatrix AssociationMatrix::strongestOfRows(int count) const
     const auto begin = entries_.begin() + static_cast<std::ptrdiff_t>(rowBegin(row));
     const auto end = entries_.begin() + static_cast<std::ptrdiff_t>(rowBegin(row + 1));
     std::vector<Association> entries(begin, end);
-    std::stable_sort(entries.begin(), entries.end(),
-                     [](const Association& a, const Association& b) { return a.weight > b.weight; });
-    entries.resize(std::min(entries.size(), static_cast<std::size_t>(std::max(0, count))));
+    const std::size_t taken = std::min(entries.size(), static_cast<std::size_t>(std::max(0, count)));
+    std::partial_sort(entries.begin(), entries.begin() + static_cast<std::ptrdiff_t>(taken), entries.end(),
+                      [](const Association& a, const Association& b) {
+                        return a.weight != b.weight ? a.weight > b.weight : a.column < b.column;
+                      });
+    entries.resize(taken);
     kept.insert(kept.end(), entries.begin(), entries.end());
   }
   return AssociationMatrix(rows_, columns_, std::move(kept));

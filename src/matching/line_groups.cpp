@@ -4,6 +4,8 @@
 
 #include "view_servo/geometry/faults.h"
 
+#include <opencv2/core.hpp>
+
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
@@ -96,13 +98,29 @@ public:
     {
       addTriplets();
     }
-    std::sort(groups_.begin(), groups_.end(), [](const LineGroup& a, const LineGroup& b) {
-      return a.key != b.key ? a.key < b.key : a.segments < b.segments;
-    });
-    return std::move(groups_);
+    return sorted();
   }
 
 private:
+  /** The groups by key, equal keys in the order in which they were formed. */
+  std::vector<LineGroup> sorted() const
+  {
+    // Numbers sort far faster than groups.
+    std::vector<std::uint64_t> order(groups_.size());
+    for (std::size_t i = 0; i < groups_.size(); ++i)
+    {
+      order[i] = static_cast<std::uint64_t>(groups_[i].key) << 32U | i;
+    }
+    std::sort(order.begin(), order.end());
+    std::vector<LineGroup> sorted;
+    sorted.reserve(groups_.size());
+    for (const std::uint64_t entry : order)
+    {
+      sorted.push_back(groups_[static_cast<std::uint32_t>(entry)]);
+    }
+    return sorted;
+  }
+
   const Segment& segment(int i) const
   {
     return segments_[static_cast<std::size_t>(i)];
@@ -307,6 +325,38 @@ private:
   std::vector<LineGroup> groups_;
 };
 
+/** Votes of some of the current groups for each reference segment (row) and current segment (column). */
+std::vector<float> votesOf(const LineIndex& reference, std::vector<LineGroup>::const_iterator group,
+                           std::vector<LineGroup>::const_iterator last, std::size_t columns)
+{
+  const auto by_key = [](const LineGroup& a, const LineGroup& b) {
+    return a.key < b.key;
+  };
+  std::vector<float> votes(static_cast<std::size_t>(reference.segmentCount()) * columns, 0.0F);
+  const std::vector<LineGroup>& stored = reference.groups();
+  auto from = stored.begin();
+  while (group != last)
+  {
+    const auto [begin, end] = std::equal_range(from, stored.end(), *group, by_key);
+    from = end;
+    const auto next = std::upper_bound(group, last, *group, by_key);
+    const float share = begin == end ? 0.0F : 1.0F / static_cast<float>(end - begin);
+    for (; group != next; ++group)
+    {
+      for (auto other = begin; other != end; ++other)
+      {
+        const float vote = (group->weight + other->weight) * share;
+        for (std::size_t k = 0; k < 3 && group->segments[k] >= 0; ++k)
+        {
+          votes[static_cast<std::size_t>(other->segments[k]) * columns +
+                static_cast<std::size_t>(group->segments[k])] += vote;
+        }
+      }
+    }
+  }
+  return votes;
+}
+
 }  // namespace
 
 std::vector<std::string> LineGroupParams::validate() const
@@ -397,40 +447,31 @@ LineIndex::LineIndex(const Segments& segments, const LineGroupParams& params)
 
 AssociationMatrix associateLines(const LineIndex& reference, const LineIndex& current)
 {
-  const std::size_t columns = static_cast<std::size_t>(current.segmentCount());
-  std::vector<float> votes(static_cast<std::size_t>(reference.segmentCount()) * columns, 0.0F);
+  constexpr std::size_t PARTS = 2;  // of the current groups, each with votes of its own; fixed, so that sums are
+  const std::vector<LineGroup>& seen = current.groups();
   const auto by_key = [](const LineGroup& a, const LineGroup& b) {
     return a.key < b.key;
   };
-  const std::vector<LineGroup>& stored = reference.groups();
-  const std::vector<LineGroup>& seen = current.groups();
-  auto from = stored.begin();
-  for (auto group = seen.begin(); group != seen.end();)
-  {
-    const auto [begin, end] = std::equal_range(from, stored.end(), *group, by_key);
-    from = end;
-    const auto last = std::upper_bound(group, seen.end(), *group, by_key);
-    const float share = begin == end ? 0.0F : 1.0F / static_cast<float>(end - begin);
-    for (; group != last; ++group)
+  const auto middle =
+      seen.empty() ? seen.end() : std::lower_bound(seen.begin(), seen.end(), seen[seen.size() / 2], by_key);
+  std::array<std::vector<float>, PARTS> votes;
+  cv::parallel_for_(cv::Range(0, PARTS), [&](const cv::Range& range) {
+    for (int part = range.start; part < range.end; ++part)
     {
-      for (auto other = begin; other != end; ++other)
-      {
-        const float vote = (group->weight + other->weight) * share;
-        for (std::size_t k = 0; k < 3 && group->segments[k] >= 0; ++k)
-        {
-          votes[static_cast<std::size_t>(other->segments[k]) * columns +
-                static_cast<std::size_t>(group->segments[k])] += vote;
-        }
-      }
+      votes[static_cast<std::size_t>(part)] =
+          votesOf(reference, part == 0 ? seen.begin() : middle, part == 0 ? middle : seen.end(),
+                  static_cast<std::size_t>(current.segmentCount()));
     }
-  }
+  });
+  const std::size_t columns = static_cast<std::size_t>(current.segmentCount());
   std::vector<Association> entries;
-  for (std::size_t i = 0; i < votes.size(); ++i)
+  entries.reserve(votes[0].size());
+  for (std::size_t i = 0; i < votes[0].size(); ++i)
   {
-    if (votes[i] > 0.0F)
+    const float sum = votes[0][i] + votes[1][i];
+    if (sum > 0.0F)
     {
-      entries.push_back(
-          { static_cast<int>(i / columns), static_cast<int>(i % columns), static_cast<double>(votes[i]) });
+      entries.push_back({ static_cast<int>(i / columns), static_cast<int>(i % columns), static_cast<double>(sum) });
     }
   }
   return { reference.segmentCount(), current.segmentCount(), std::move(entries) };

@@ -157,21 +157,42 @@ std::optional<Eigen::Matrix3d> plausibleAffinity(const Eigen::Vector2d* from, co
   return map;
 }
 
-bool isInside(const cv::Mat& image, const Eigen::Vector2d& at)
+/** Bilinear intensities of an 8-bit image. */
+class Sampler
 {
-  return at.x() >= 0.0 && at.y() >= 0.0 && at.x() < image.cols - 1.0 && at.y() < image.rows - 1.0;
-}
+public:
+  explicit Sampler(const cv::Mat& image)
+    : data_(image.data),
+      step_(image.step),
+      last_u_(static_cast<float>(image.cols - 1)),
+      last_v_(static_cast<float>(image.rows - 1))
+  {
+  }
 
-double bilinear(const cv::Mat& image, const Eigen::Vector2d& at)
-{
-  const int u = static_cast<int>(at.x());
-  const int v = static_cast<int>(at.y());
-  const double fu = at.x() - u;
-  const double fv = at.y() - v;
-  const unsigned char* p = image.ptr<unsigned char>(v) + u;
-  const unsigned char* q = image.ptr<unsigned char>(v + 1) + u;
-  return (1.0 - fv) * ((1.0 - fu) * p[0] + fu * p[1]) + fv * ((1.0 - fu) * q[0] + fu * q[1]);
-}
+  bool contains(float u, float v) const
+  {
+    return u >= 0.0F && v >= 0.0F && u < last_u_ && v < last_v_;
+  }
+
+  float at(float u, float v) const
+  {
+    const int left = static_cast<int>(u);
+    const int top = static_cast<int>(v);
+    const float fu = u - static_cast<float>(left);
+    const float fv = v - static_cast<float>(top);
+    const unsigned char* p = data_ + static_cast<std::size_t>(top) * step_ + left;
+    const unsigned char* q = p + step_;
+    const float above = static_cast<float>(p[0]) + fu * static_cast<float>(p[1] - p[0]);
+    const float below = static_cast<float>(q[0]) + fu * static_cast<float>(q[1] - q[0]);
+    return above + fv * (below - above);
+  }
+
+private:
+  const unsigned char* data_;
+  std::size_t step_;
+  float last_u_;
+  float last_v_;
+};
 
 class RegionFinder
 {
@@ -183,15 +204,22 @@ public:
       association_(association),
       params_(params),
       min_cosine_(std::cos(params.max_angle_deg * M_PI / 180.0)),
-      row_best_(static_cast<std::size_t>(association.rows()), 0.0),
-      column_best_(static_cast<std::size_t>(association.columns()), 0.0)
+      votes_(Eigen::MatrixXf::Zero(association.rows(), association.columns()))
   {
+    std::vector<double> row_best(static_cast<std::size_t>(association.rows()), 0.0);
+    std::vector<double> column_best(static_cast<std::size_t>(association.columns()), 0.0);
     for (const Association& entry : association.entries())
     {
-      double& row = row_best_[static_cast<std::size_t>(entry.row)];
-      double& column = column_best_[static_cast<std::size_t>(entry.column)];
+      double& row = row_best[static_cast<std::size_t>(entry.row)];
+      double& column = column_best[static_cast<std::size_t>(entry.column)];
       row = std::max(row, entry.weight);
       column = std::max(column, entry.weight);
+    }
+    for (const Association& entry : association.entries())
+    {
+      votes_(entry.row, entry.column) =
+          static_cast<float>(entry.weight / row_best[static_cast<std::size_t>(entry.row)] +
+                             entry.weight / column_best[static_cast<std::size_t>(entry.column)]);
     }
   }
 
@@ -255,9 +283,7 @@ private:
     std::vector<Association> ranked = association_.strongestOfRows(params_.max_candidates).entries();
     for (Association& entry : ranked)
     {
-      entry.weight = entry.weight / row_best_[static_cast<std::size_t>(entry.row)] +
-                     entry.weight / column_best_[static_cast<std::size_t>(entry.column)] +
-                     LOG_SHARE * std::log1p(entry.weight);
+      entry.weight = votes_(entry.row, entry.column) + LOG_SHARE * std::log1p(entry.weight);
     }
     std::stable_sort(ranked.begin(), ranked.end(),
                      [](const Association& a, const Association& b) { return a.weight > b.weight; });
@@ -335,10 +361,7 @@ private:
       constexpr double UNKNOWN = 1e-3;
       return UNKNOWN;
     }
-    const double weight = association_.weight(i, k);
-    return weight > 0.0
-               ? weight / row_best_[static_cast<std::size_t>(i)] + weight / column_best_[static_cast<std::size_t>(k)]
-               : 0.0;
+    return votes_(i, k);
   }
 
   struct Hypothesis
@@ -583,8 +606,7 @@ private:
   const AssociationMatrix& association_;
   const LineRegionParams& params_;
   double min_cosine_;
-  std::vector<double> row_best_;     // largest weight of each row of the association
-  std::vector<double> column_best_;  // and of each column
+  Eigen::MatrixXf votes_;  // the association, each as a part of its row's best and of its column's, added
 };
 
 }  // namespace
@@ -668,10 +690,11 @@ double sideCorrelation(const cv::Mat& reference, const cv::Mat& current, const E
 {
   constexpr int ALONG = 16;
   constexpr int ACROSS = 6;
-  constexpr double FIRST = 1.0;    // distance of the samples from the segment [px]
-  constexpr double STEP = 1.5;     // [px]
-  constexpr int MIN_SAMPLES = 30;  // of a side, within both images
-  constexpr double NOISE = 4.0;    // variance of intensities that means nothing
+  constexpr float FIRST = 1.0F;     // distance of the samples from the segment [px]
+  constexpr float STEP = 1.5F;      // [px]
+  constexpr int MIN_SAMPLES = 30;   // of a side, within both images
+  constexpr float NOISE = 4.0F;     // variance of intensities that means nothing
+  constexpr float MIDDLE = 128.0F;  // keeps sums small
   const auto mapped = transfer(h, reference_segment);
   if (!mapped)
   {
@@ -691,33 +714,38 @@ double sideCorrelation(const cv::Mat& reference, const cv::Mat& current, const E
   const Eigen::Vector3d start_there = h * reference_segment.start.homogeneous();
   const Eigen::Vector3d along_there = h.leftCols<2>() * along;
   const Eigen::Vector3d normal_there = h.leftCols<2>() * normal;
+  const Sampler from(reference);
+  const Sampler to(current);
 
   double best = -1.0;
   for (const double side : { -1.0, 1.0 })
   {
-    double sum_a = 0.0;
-    double sum_b = 0.0;
-    double sum_aa = 0.0;
-    double sum_bb = 0.0;
-    double sum_ab = 0.0;
+    float sum_a = 0.0F;
+    float sum_b = 0.0F;
+    float sum_aa = 0.0F;
+    float sum_bb = 0.0F;
+    float sum_ab = 0.0F;
     int n = 0;
     for (int i = 0; i < ALONG; ++i)
     {
       const double fraction = first + (last - first) * (i + 0.5) / ALONG;
-      const Eigen::Vector2d on_line = reference_segment.start + fraction * along;
-      const Eigen::Vector3d on_line_there = start_there + fraction * along_there;
+      const Eigen::Vector2f on_line = (reference_segment.start + fraction * along).cast<float>();
+      const Eigen::Vector3f on_line_there = (start_there + fraction * along_there).cast<float>();
+      const Eigen::Vector2f across = (side * normal).cast<float>();
+      const Eigen::Vector3f across_there = (side * normal_there).cast<float>();
       for (int j = 0; j < ACROSS; ++j)
       {
-        const double offset = side * (FIRST + STEP * j);
-        const Eigen::Vector2d at = on_line + offset * normal;
-        const Eigen::Vector3d seen = on_line_there + offset * normal_there;
-        const Eigen::Vector2d there = seen.hnormalized();
-        if (!(seen.z() > 0.0) || !isInside(reference, at) || !isInside(current, there))
+        const float offset = FIRST + STEP * static_cast<float>(j);
+        const Eigen::Vector2f at = on_line + offset * across;
+        const Eigen::Vector3f seen = on_line_there + offset * across_there;
+        const float scale = 1.0F / seen.z();
+        const Eigen::Vector2f there = scale * seen.head<2>();
+        if (!(seen.z() > 0.0F) || !from.contains(at.x(), at.y()) || !to.contains(there.x(), there.y()))
         {
           continue;
         }
-        const double a = bilinear(reference, at);
-        const double b = bilinear(current, there);
+        const float a = from.at(at.x(), at.y()) - MIDDLE;
+        const float b = to.at(there.x(), there.y()) - MIDDLE;
         sum_a += a;
         sum_b += b;
         sum_aa += a * a;
@@ -728,10 +756,11 @@ double sideCorrelation(const cv::Mat& reference, const cv::Mat& current, const E
     }
     if (n >= MIN_SAMPLES)
     {
-      const double variance_a = sum_aa / n - sum_a / n * (sum_a / n);
-      const double variance_b = sum_bb / n - sum_b / n * (sum_b / n);
-      const double covariance = sum_ab / n - sum_a / n * (sum_b / n);
-      best = std::max(best, covariance / std::sqrt((variance_a + NOISE) * (variance_b + NOISE)));
+      const float samples = static_cast<float>(n);
+      const float variance_a = sum_aa / samples - sum_a / samples * (sum_a / samples);
+      const float variance_b = sum_bb / samples - sum_b / samples * (sum_b / samples);
+      const float covariance = sum_ab / samples - sum_a / samples * (sum_b / samples);
+      best = std::max<double>(best, covariance / std::sqrt((variance_a + NOISE) * (variance_b + NOISE)));
     }
   }
   return best;

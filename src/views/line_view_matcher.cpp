@@ -15,9 +15,9 @@
 #include <opencv2/core/utility.hpp>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstddef>
-#include <iterator>
 #include <limits>
 #include <optional>
 #include <stdexcept>
@@ -36,6 +36,11 @@ constexpr double HUBER_WIDTH = 0.5;  // of the final fits: residuals beyond coun
 double quality(const SegmentMatch& match)
 {
   return 0.5 * (match.share + match.correlation);
+}
+
+bool isBetter(const SegmentMatch& a, const SegmentMatch& b)
+{
+  return quality(a) > quality(b);
 }
 
 Correspondences positions(const std::vector<MatchedPoint>& points)
@@ -120,6 +125,8 @@ public:
     }
     RansacParams ransac_params = params_.ransac;
     ransac_params.sampling = Sampling::UNIFORM;  // the best are all of one region, often a plane
+    ransac_params.local_optimizations =
+        std::min(ransac_params.local_optimizations, 2);  // it tells right from wrong only
     const auto found = ransac(FundamentalEstimator(pairs, 0.0), ransac_params, rng_);
     if (found.model)
     {
@@ -180,8 +187,7 @@ public:
     {
       all.insert(all.end(), region.matches.begin(), region.matches.end());
     }
-    std::stable_sort(all.begin(), all.end(),
-                     [](const SegmentMatch& a, const SegmentMatch& b) { return quality(a) > quality(b); });
+    std::stable_sort(all.begin(), all.end(), isBetter);
     return all;
   }
 
@@ -205,72 +211,87 @@ private:
    * Several regions may have grown on one plane, each bent by its own wrong matches. Those of all regions that lie near
    * what the best ones say are searched for a homography, from which another region grows.
    */
-  void consolidate(std::vector<LineRegion>& regions)
+  void consolidate(std::vector<LineRegion>& regions) const
   {
     constexpr std::size_t BEST = 3;
-    constexpr double NEAR = 4.0;  // tolerances
-    constexpr std::size_t MIN_LINES = 8;
-    RansacParams ransac_params = params_.ransac;
-    ransac_params.inlier_threshold = params_.plane_threshold;
-    ransac_params.sampling = Sampling::UNIFORM;
-    ransac_params.max_iterations = std::min(ransac_params.max_iterations, 200);
-    const double min_cosine = std::cos(params_.regions.max_angle_deg * M_PI / 180.0);
     // Each match once.
     std::vector<SegmentMatch> all;
     for (const LineRegion& region : regions)
     {
       all.insert(all.end(), region.matches.begin(), region.matches.end());
     }
-    const auto place = [](const SegmentMatch& match) {
-      return std::pair(match.reference, match.current);
-    };
-    std::stable_sort(all.begin(), all.end(),
-                     [&](const SegmentMatch& a, const SegmentMatch& b) { return place(a) < place(b); });
+    std::stable_sort(all.begin(), all.end(), [](const SegmentMatch& a, const SegmentMatch& b) {
+      return std::pair(a.reference, a.current) < std::pair(b.reference, b.current);
+    });
     all.erase(std::unique(all.begin(), all.end(),
-                          [&](const SegmentMatch& a, const SegmentMatch& b) { return place(a) == place(b); }),
+                          [](const SegmentMatch& a, const SegmentMatch& b) {
+                            return a.reference == b.reference && a.current == b.current;
+                          }),
               all.end());
+    std::stable_sort(all.begin(), all.end(), isBetter);
 
-    std::vector<LineRegion> grown;
-    for (std::size_t i = 0; i < std::min(BEST, regions.size()); ++i)
+    std::array<std::optional<LineRegion>, BEST> grown;
+    cv::parallel_for_(cv::Range(0, static_cast<int>(std::min(BEST, regions.size()))), [&](const cv::Range& range) {
+      for (int i = range.start; i < range.end; ++i)
+      {
+        grown[static_cast<std::size_t>(i)] = fromMatchesNear(regions[static_cast<std::size_t>(i)].h, all);
+      }
+    });
+    for (std::optional<LineRegion>& region : grown)
     {
-      std::vector<SegmentMatch> near;
-      SegmentPairs lines;
-      for (const SegmentMatch& match : all)
+      if (region)
       {
-        const SegmentPair pair{ from_.segment(match.reference), to_.segment(match.current) };
-        const auto mapped = transfer(regions[i].h, pair.reference);
-        if (!mapped)
-        {
-          continue;
-        }
-        const SegmentAgreement found = compare(*mapped, pair.current);
-        if (found.distance <= NEAR * params_.regions.tolerance && found.cosine >= min_cosine)
-        {
-          near.push_back(match);
-          lines.push_back(pair);
-        }
-      }
-      if (lines.size() < MIN_LINES)
-      {
-        continue;
-      }
-      const auto found = ransac(LineHomographyEstimator(lines), ransac_params, rng_);
-      if (!found.model)
-      {
-        continue;
-      }
-      std::vector<SegmentMatch> inliers;
-      for (const int k : found.inliers)
-      {
-        inliers.push_back(near[static_cast<std::size_t>(k)]);
-      }
-      if (auto region = growLineRegion(from_, to_, found.model->h, inliers, params_.regions))
-      {
-        grown.push_back(std::move(*region));
+        regions.push_back(std::move(*region));
       }
     }
-    regions.insert(regions.end(), std::make_move_iterator(grown.begin()), std::make_move_iterator(grown.end()));
     std::stable_sort(regions.begin(), regions.end(), hasMoreSupport);
+  }
+
+  /** The region that grows from a homography of those of the matches, best first, that lie near what another says. */
+  std::optional<LineRegion> fromMatchesNear(const Eigen::Matrix3d& h, const std::vector<SegmentMatch>& matches) const
+  {
+    constexpr double NEAR = 4.0;  // tolerances
+    constexpr std::size_t MIN_LINES = 8;
+    constexpr std::size_t MAX_LINES = 120;
+    constexpr int MAX_ITERATIONS = 200;
+    const double min_cosine = std::cos(params_.regions.max_angle_deg * M_PI / 180.0);
+    std::vector<SegmentMatch> near;
+    SegmentPairs lines;
+    for (std::size_t i = 0; i < matches.size() && near.size() < MAX_LINES; ++i)
+    {
+      const SegmentPair pair{ from_.segment(matches[i].reference), to_.segment(matches[i].current) };
+      const auto mapped = transfer(h, pair.reference);
+      if (!mapped)
+      {
+        continue;
+      }
+      const SegmentAgreement found = compare(*mapped, pair.current);
+      if (found.distance <= NEAR * params_.regions.tolerance && found.cosine >= min_cosine)
+      {
+        near.push_back(matches[i]);
+        lines.push_back(pair);
+      }
+    }
+    if (lines.size() < MIN_LINES)
+    {
+      return std::nullopt;
+    }
+    RansacParams ransac_params = params_.ransac;
+    ransac_params.inlier_threshold = params_.plane_threshold;
+    ransac_params.sampling = Sampling::UNIFORM;
+    ransac_params.max_iterations = std::min(ransac_params.max_iterations, MAX_ITERATIONS);
+    Rng rng(params_.seed);
+    const auto found = ransac(LineHomographyEstimator(lines), ransac_params, rng);
+    if (!found.model)
+    {
+      return std::nullopt;
+    }
+    std::vector<SegmentMatch> inliers;
+    for (const int i : found.inliers)
+    {
+      inliers.push_back(near[static_cast<std::size_t>(i)]);
+    }
+    return growLineRegion(from_, to_, found.model->h, inliers, params_.regions);
   }
 
   Correspondence midpoint(const LineRegion& region, const SegmentMatch& match) const
@@ -321,6 +342,7 @@ Planes findPlanes(const SegmentPairs& lines, const LineMatcherParams& params, Rn
   RansacParams ransac_params = params.ransac;
   ransac_params.inlier_threshold = params.plane_threshold;
   ransac_params.sampling = Sampling::UNIFORM;
+  ransac_params.max_iterations = std::min(ransac_params.max_iterations, 500);  // enough for a third of the lines
   std::vector<int> left(lines.size());
   for (std::size_t i = 0; i < lines.size(); ++i)
   {
