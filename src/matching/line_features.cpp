@@ -19,11 +19,6 @@ namespace view_servo
 {
 namespace
 {
-double cross(const Eigen::Vector2d& a, const Eigen::Vector2d& b)
-{
-  return a.x() * b.y() - a.y() * b.x();
-}
-
 double distanceToPoint(const Segment& segment, const Eigen::Vector2d& point)
 {
   const Eigen::Vector2d d = segment.end - segment.start;

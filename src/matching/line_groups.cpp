@@ -16,20 +16,18 @@ namespace view_servo
 {
 namespace
 {
-double cross(const Eigen::Vector2d& a, const Eigen::Vector2d& b)
+/**
+ * The digits of a segment's end points with respect to the line of another: 2 on the side of its normal(), 0 on the
+ * other, 1 within `collinearity` [px].
+ */
+int digits(const Segment& line, const Segment& ends, double collinearity)
 {
-  return a.x() * b.y() - a.y() * b.x();
-}
-
-/** Signed distance of a point from the line through a segment [px]; positive on the side of normal(). */
-double side(const Segment& segment, const Eigen::Vector2d& point)
-{
-  return cross(segment.end - segment.start, point - segment.start) / segment.length();
-}
-
-int digit(double distance, double collinearity)
-{
-  return distance > collinearity ? 2 : (distance < -collinearity ? 0 : 1);
+  const Eigen::Vector2d along = line.end - line.start;
+  const double limit = collinearity * along.norm();
+  const auto digit = [limit](double area) {
+    return area > limit ? 2 : (area < -limit ? 0 : 1);
+  };
+  return 3 * digit(cross(along, ends.start - line.start)) + digit(cross(along, ends.end - line.start));
 }
 
 /** A segment whose nearest end point may have been moved to the intersection. */
@@ -42,7 +40,7 @@ Segment extended(Segment segment, const Eigen::Vector2d& to)
 
 double distanceToNearestEnd(const Segment& segment, const Eigen::Vector2d& point)
 {
-  return std::min((segment.start - point).norm(), (segment.end - point).norm());
+  return std::sqrt(std::min((segment.start - point).squaredNorm(), (segment.end - point).squaredNorm()));
 }
 
 bool isVertical(const Segment& segment)
@@ -387,8 +385,7 @@ std::vector<std::string> LineGroupParams::validate() const
 
 int pairIndex(const Segment& a, const Segment& b, double collinearity)
 {
-  return digit(side(a, b.start), collinearity) * 27 + digit(side(a, b.end), collinearity) * 9 +
-         digit(side(b, a.start), collinearity) * 3 + digit(side(b, a.end), collinearity);
+  return 9 * digits(a, b, collinearity) + digits(b, a, collinearity);
 }
 
 std::optional<Eigen::Vector2d> lineIntersection(const Segment& a, const Segment& b, double min_angle)

@@ -26,11 +26,6 @@ constexpr double MAX_ANISOTROPY = 6.0;     // ratio of a local map's singular va
 constexpr std::size_t MIN_HOMOGRAPHY = 8;  // matches from which on a homography is fitted rather than an affine map
 constexpr int BATCH = 32;                  // candidates evaluated side by side; fixed, so that results are
 
-double cross(const Eigen::Vector2d& a, const Eigen::Vector2d& b)
-{
-  return a.x() * b.y() - a.y() * b.x();
-}
-
 double supportOf(double share)
 {
   return 0.3 + 0.7 * share;

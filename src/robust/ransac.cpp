@@ -32,10 +32,10 @@ std::vector<std::string> RansacParams::validate() const
     }
   };
   require(inlier_threshold > 0.0 && std::isfinite(inlier_threshold), "inlier_threshold must be positive and finite");
-  require(confidence > 0.0 && confidence < 1.0, "confidence must be between 0 and 1, both excluded");
-  require(min_iterations >= 0, "min_iterations must not be negative");
-  require(max_iterations >= 1, "max_iterations must be at least 1");
-  require(max_rejected >= 0, "max_rejected must not be negative");
+  require(confidence > 0.0 && confidence < 1.0, "ransac_confidence must be between 0 and 1, both excluded");
+  require(min_iterations >= 0, "ransac_min_iterations must not be negative");
+  require(max_iterations >= 1, "ransac_max_iterations must be at least 1");
+  require(max_rejected >= 0, "ransac_max_rejected must not be negative");
   require(local_optimizations >= 0, "local_optimizations must not be negative");
   require(sampling == Sampling::UNIFORM || sampling == Sampling::PROGRESSIVE,
           "sampling must be UNIFORM or PROGRESSIVE");

@@ -8,6 +8,12 @@
 
 namespace view_servo
 {
+/** Third component of the cross product of two plane vectors: positive when b lies in the sense of +90 degrees from a. */
+inline double cross(const Eigen::Vector2d& a, const Eigen::Vector2d& b)
+{
+  return a.x() * b.y() - a.y() * b.x();
+}
+
 /** A line segment in an image, from `start` to `end` [px]. */
 struct Segment
 {

@@ -31,8 +31,8 @@ struct LineRegionParams
   double max_angle_deg = 10.0;    ///< between a segment and its counterpart, (0, 45)
   double min_support = 5.0;       ///< of a region: sum over its matches of 0.3 + 0.7 share, > 0
   double min_correlation =
-      0.35;  ///< of the intensities beside a segment, on its better side, with its counterpart's, [-1, 1)
-  double min_mean_correlation = 0.55;  ///< of a region's matches, [-1, 1)
+      0.55;  ///< of the intensities beside a segment, on its better side, with its counterpart's, [-1, 1)
+  double min_mean_correlation = 0.6;  ///< of a region's matches, [-1, 1)
 
   /** All faults, one a line; empty when the parameters are usable. */
   std::vector<std::string> validate() const;
