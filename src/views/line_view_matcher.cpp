@@ -28,8 +28,8 @@ namespace view_servo
 namespace
 {
 constexpr double NOT_A_NUMBER = std::numeric_limits<double>::quiet_NaN();
-/** Support that the best region must have; nine of ten of the best regions of unrelated images have less than 7.1. */
-constexpr double BEYOND_CHANCE = 8.0;
+/** Support that the best region must have: of 128 pairs of unrelated images none had one of more than 5.6. */
+constexpr double BEYOND_CHANCE = 7.0;
 constexpr double HUBER_WIDTH = 0.5;  // of the final fits: residuals beyond count linearly [px]
 
 /** How sure a match is: the mean of what the segments share and of how alike their surroundings look. */
