@@ -490,7 +490,7 @@ private:
         region = { tried.map, std::move(matches), sum };
       }
     }
-    if (region.matches.empty())
+    if (region.matches.empty() || !promises(region))
     {
       return std::nullopt;
     }
@@ -570,6 +570,26 @@ private:
     }
   }
 
+  /** Whether what lies beside the best matches of a first, rough map is somewhat alike: refining costs more to find out. */
+  bool promises(const LineRegion& region) const
+  {
+    constexpr std::size_t TRIED = 6;
+    constexpr double SLACK = 0.1;  // of the mean correlation asked for
+    const std::size_t count = std::min(TRIED, region.matches.size());
+    double sum = 0.0;
+    for (std::size_t i = 0; i < count; ++i)
+    {
+      sum += correlation(region, region.matches[i]);
+    }
+    return sum >= (params_.min_mean_correlation - SLACK) * static_cast<double>(count);
+  }
+
+  double correlation(const LineRegion& region, const SegmentMatch& match) const
+  {
+    return sideCorrelation(from_.smoothed(), to_.smoothed(), region.h, reference(match.reference),
+                           current(match.current));
+  }
+
   /** Drops the matches whose surroundings differ; false when those of the whole region do. */
   bool looksAlike(LineRegion& region) const
   {
@@ -577,8 +597,7 @@ private:
     std::vector<SegmentMatch> kept;
     for (SegmentMatch match : region.matches)
     {
-      match.correlation = sideCorrelation(from_.smoothed(), to_.smoothed(), region.h, reference(match.reference),
-                                          current(match.current));
+      match.correlation = correlation(region, match);
       sum += match.correlation;
       if (match.correlation >= params_.min_correlation)
       {
