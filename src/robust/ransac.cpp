@@ -9,19 +9,6 @@
 
 namespace view_servo
 {
-std::size_t uniformIndex(Rng& rng, std::size_t count)
-{
-  // The lowest 2^64 mod count values are refused: what remains is a whole number of times [0, count).
-  const std::uint64_t n = count;
-  const std::uint64_t refused = (std::uint64_t{ 0 } - n) % n;
-  std::uint64_t value = rng();
-  while (value < refused)
-  {
-    value = rng();
-  }
-  return static_cast<std::size_t>(value % n);
-}
-
 std::vector<std::string> RansacParams::validate() const
 {
   std::vector<std::string> faults;

@@ -49,7 +49,7 @@ double rmsDistance(const Eigen::Matrix3d& f, const test::Scene& scene)
   while (pairs.size() < 200)
   {
     const Eigen::Vector2d reference = test::randomPixel(rng);
-    const Eigen::Vector3d x = test::uniform(rng, 3.0, 6.0) * (k_inverse * reference.homogeneous());
+    const Eigen::Vector3d x = uniform(rng, 3.0, 6.0) * (k_inverse * reference.homogeneous());
     pairs.push_back({ reference, (scene.k * (scene.r * x + scene.t)).hnormalized() });
   }
   return std::sqrt(totalError(f, pairs) / static_cast<double>(pairs.size()));
@@ -159,7 +159,7 @@ TEST(FundamentalFromSevenPoints, FindsASolutionThatIsADirectionOfThePencil)
   for (int i = 0; i < 7; ++i)
   {
     const Eigen::Vector2d p = test::randomPixel(rng);
-    pairs.push_back({ p, { p.x() + test::uniform(rng, 5.0, 60.0), p.y() } });
+    pairs.push_back({ p, { p.x() + uniform(rng, 5.0, 60.0), p.y() } });
   }
   Eigen::Matrix3d truth;
   truth << 0, 0, 0, 0, 0, -1, 0, 1, 0;
@@ -255,7 +255,7 @@ RC_GTEST_PROP(Orthonormal, DerivativesMatchNumericOnes, (std::uint64_t seed))
   Eigen::Matrix3d any;
   for (int i = 0; i < 9; ++i)
   {
-    any(i / 3, i % 3) = test::gaussian(rng);
+    any(i / 3, i % 3) = gaussian(rng);
   }
   const Orthonormal orthonormal(any);
   const Matrix9x7d derivatives = orthonormal.derivatives();
@@ -297,7 +297,7 @@ TEST(RefineFundamental, NoNearbyMatrixOfRankTwoIsBetter)
     Vector7d step;
     for (int k = 0; k < 7; ++k)
     {
-      step(k) = 1e-5 * test::gaussian(rng);
+      step(k) = 1e-5 * gaussian(rng);
     }
     EXPECT_GT(totalError(Orthonormal(refined).moved(step).matrix(), scene.pairs), error);
   }

@@ -240,8 +240,8 @@ TEST(HomographyFromPoints, EmptyWhenAPointMapsBeyondInfinity)
   Rng rng(4);
   for (int i = 0; i < 12; ++i)
   {
-    const double u = i < 6 ? test::uniform(rng, 0.0, 80.0) : test::uniform(rng, 120.0, 300.0);
-    const Eigen::Vector2d reference(u, test::uniform(rng, 0.0, 300.0));
+    const double u = i < 6 ? uniform(rng, 0.0, 80.0) : uniform(rng, 120.0, 300.0);
+    const Eigen::Vector2d reference(u, uniform(rng, 0.0, 300.0));
     pairs.push_back({ reference, (h * reference.homogeneous()).hnormalized() });
   }
   EXPECT_FALSE(homographyFromPoints(pairs));

@@ -19,7 +19,6 @@ namespace view_servo
 {
 namespace
 {
-using test::uniform;
 
 Eigen::Matrix3d exampleHomography()
 {

@@ -22,7 +22,6 @@ namespace view_servo
 {
 namespace
 {
-using test::uniform;
 
 constexpr double COLLINEARITY = 1e-6;  // for exact constructions [px]
 

@@ -107,8 +107,8 @@ Points linePoints(int inliers, int outliers, double noise, std::uint64_t seed)
   Points points;
   for (int i = 0; i < inliers; ++i)
   {
-    const double x = test::uniform(rng, 0.0, 640.0);
-    points.emplace_back(x, 0.5 * x + 40.0 + noise * test::gaussian(rng));
+    const double x = uniform(rng, 0.0, 640.0);
+    points.emplace_back(x, 0.5 * x + 40.0 + noise * gaussian(rng));
   }
   for (int i = 0; i < outliers; ++i)
   {
@@ -296,7 +296,7 @@ TEST(Ransac, ProgressiveSamplingMeetsAGoodSampleSooner)
     std::vector<std::pair<double, int>> ranked;
     for (int i = 0; i < 500; ++i)
     {
-      ranked.emplace_back(-(test::gaussian(order_rng) + (i < 50 ? 1.5 : 0.0)), i);
+      ranked.emplace_back(-(gaussian(order_rng) + (i < 50 ? 1.5 : 0.0)), i);
     }
     std::sort(ranked.begin(), ranked.end());
     Points points;
@@ -606,7 +606,7 @@ TEST(SequentialTest, KeepsModelsAsGoodAsTheBestAndDropsBadOnes)
         bool fails = false;
         for (int i = 0; i < 500 && !fails; ++i)
         {
-          test.add(test::uniform(rng, 0.0, 1.0) < inlier_ratio, evidence);
+          test.add(uniform(rng, 0.0, 1.0) < inlier_ratio, evidence);
           fails = detail::SequentialTest::fails(evidence);
         }
         failed += fails ? 1 : 0;

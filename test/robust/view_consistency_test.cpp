@@ -59,8 +59,8 @@ RC_GTEST_PROP(ViewConstraint, IsInvariantToScaleRotationAndTranslationOfEitherVi
   RC_ASSERT(value >= 0.0 && value <= 1.0);
   for (const auto side : { &Correspondence::reference, &Correspondence::current })
   {
-    const double scale = std::exp(test::uniform(rng, -4.0, 4.0));
-    const double angle = test::uniform(rng, -3.0, 3.0);
+    const double scale = std::exp(uniform(rng, -4.0, 4.0));
+    const double angle = uniform(rng, -3.0, 3.0);
     const Eigen::Vector2d offset = test::randomPixel(rng);
     RC_ASSERT(std::abs(viewConstraint(moved(five, side, scale, angle, offset)) - value) < 1e-8);
   }
@@ -93,7 +93,7 @@ TEST(ViewConstraint, GrowsWithNoise)
       auto five = firstFive(test::scaledOrthographicPairs(5, rng));
       for (Correspondence& pair : five)
       {
-        pair.current += noise * Eigen::Vector2d(test::gaussian(rng), test::gaussian(rng));
+        pair.current += noise * Eigen::Vector2d(gaussian(rng), gaussian(rng));
       }
       values.push_back(viewConstraint(five));
     }
@@ -149,8 +149,8 @@ Correspondences mixedPairs(int inliers, int outliers, Rng& rng)
   Correspondences pairs = test::scaledOrthographicPairs(inliers, rng);
   for (Correspondence& pair : pairs)
   {
-    const double u = test::gaussian(rng);
-    pair.current += Eigen::Vector2d(u, test::gaussian(rng));
+    const double u = gaussian(rng);
+    pair.current += Eigen::Vector2d(u, gaussian(rng));
   }
   for (int i = 0; i < outliers; ++i)
   {

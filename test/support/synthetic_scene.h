@@ -27,18 +27,6 @@ inline const bool RAPIDCHECK_SEEDED = setenv("RC_PARAMS", "seed=2002", 0) == 0;
 constexpr double IMAGE_WIDTH = 640.0;   // [px]
 constexpr double IMAGE_HEIGHT = 480.0;  // [px]
 
-inline double uniform(Rng& rng, double low, double high)
-{
-  return low + (high - low) * std::ldexp(static_cast<double>(rng() >> 11), -53);
-}
-
-/** Standard normal (Box & Muller). */
-inline double gaussian(Rng& rng)
-{
-  const double radius = std::sqrt(-2.0 * std::log(1.0 - uniform(rng, 0.0, 1.0)));
-  return radius * std::cos(uniform(rng, 0.0, 2.0 * M_PI));
-}
-
 inline Eigen::Vector2d randomPixel(Rng& rng)
 {
   const double u = uniform(rng, 0.0, IMAGE_WIDTH - 1.0);

@@ -24,7 +24,6 @@ namespace view_servo
 {
 namespace
 {
-using test::uniform;
 
 const cv::Size SIZE(640, 480);
 

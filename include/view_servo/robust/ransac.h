@@ -2,21 +2,15 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include "view_servo/robust/random.h"
+
 #include <cstddef>
-#include <cstdint>
 #include <optional>
-#include <random>
 #include <string>
 #include <vector>
 
 namespace view_servo
 {
-/** Portable generator: std::mt19937_64's output is fixed by the standard; uniformIndex() fixes the rest. */
-using Rng = std::mt19937_64;
-
-/** Uniform integer in [0, count), the same on every machine (std::uniform_int_distribution is not). count > 0. */
-std::size_t uniformIndex(Rng& rng, std::size_t count);
-
 enum class Sampling
 {
   UNIFORM,     ///< every datum equally likely

@@ -1,0 +1,145 @@
+// Copyright (c) 2026, the view_servo authors
+// SPDX-License-Identifier: BSD-3-Clause
+#include "sim/nomad.h"
+
+#include "view_servo/geometry/faults.h"
+
+#include <algorithm>
+#include <cmath>
+#include <stdexcept>
+
+namespace view_servo::sim
+{
+namespace
+{
+/** Shortens a vector to at most a length. */
+Eigen::Vector2d limited(const Eigen::Vector2d& v, double length)
+{
+  const double norm = v.norm();
+  return norm > length ? Eigen::Vector2d(v * (length / norm)) : v;
+}
+
+/** A pose (x, y, yaw) after a motion in its own frame, along the arc of constant velocity. */
+Eigen::Vector3d moved(const Eigen::Vector3d& pose, const Eigen::Vector3d& motion)
+{
+  // In the middle of the motion the frame has turned by half: exact to the third order.
+  const Eigen::Rotation2Dd middle(pose.z() + 0.5 * motion.z());
+  const Eigen::Vector2d to = pose.head<2>() + middle * Eigen::Vector2d(motion.head<2>());
+  return { to.x(), to.y(), std::remainder(pose.z() + motion.z(), 2.0 * M_PI) };
+}
+
+Eigen::Isometry3d toIsometry(const Eigen::Vector3d& pose)
+{
+  return planarPose(pose.x(), pose.y(), pose.z());
+}
+
+}  // namespace
+
+std::vector<std::string> NomadParams::validate() const
+{
+  std::vector<std::string> faults;
+  const auto require = [&faults](bool condition, const char* fault) {
+    if (!condition)
+    {
+      faults.emplace_back(fault);
+    }
+  };
+  require(max_speed > 0.0, "max_speed must be more than 0 m/s");
+  require(max_turn_rate > 0.0, "max_turn_rate must be more than 0 rad/s");
+  require(max_acceleration > 0.0, "max_acceleration must be more than 0 m/s^2");
+  require(max_turn_acceleration > 0.0, "max_turn_acceleration must be more than 0 rad/s^2");
+  require(radius > 0.0, "radius must be more than 0 m");
+  require(odometry_drift > -1.0 && std::isfinite(odometry_drift), "odometry_drift must be more than -1");
+  require(std::isfinite(odometry_turn_drift), "odometry_turn_drift must be finite");
+  require(odometry_noise >= 0.0 && std::isfinite(odometry_noise), "odometry_noise must be at least 0");
+  return faults;
+}
+
+Nomad::Nomad(const World& world, const NomadParams& params)
+  : world_(world),
+    params_(params),
+    rng_(params.seed),
+    pose_(Eigen::Vector3d::Zero()),
+    odometry_(Eigen::Vector3d::Zero())
+{
+  requireNoFaults("parameters of the base", params.validate());
+  setPose(world.goal);
+}
+
+void Nomad::setPose(const Eigen::Isometry3d& pose)
+{
+  if (!pose.matrix().allFinite())
+  {
+    throw std::invalid_argument("the pose is not finite");
+  }
+  const Eigen::Vector2d at = pose.translation().head<2>();
+  const std::string touched = touchedObstacle(world_, at, params_.radius);
+  if (!touched.empty())
+  {
+    throw std::invalid_argument("the base cannot stand there: " + touched + " is in the way");
+  }
+  pose_ << at, yawOf(pose);
+  velocity_.setZero();
+  commanded_.setZero();
+  measured_.setZero();
+  blocked_by_.clear();
+}
+
+bool Nomad::command(const Velocity& velocity)
+{
+  if (!velocity.allFinite())
+  {
+    return false;
+  }
+  commanded_.head<2>() = limited(velocity.head<2>(), params_.max_speed);
+  commanded_.z() = std::clamp(velocity.z(), -params_.max_turn_rate, params_.max_turn_rate);
+  return true;
+}
+
+void Nomad::step(double dt)
+{
+  const Eigen::Vector2d change = commanded_.head<2>() - velocity_.head<2>();
+  velocity_.head<2>() += limited(change, params_.max_acceleration * dt);
+  const double turn = params_.max_turn_acceleration * dt;
+  velocity_.z() += std::clamp(commanded_.z() - velocity_.z(), -turn, turn);
+
+  Eigen::Vector3d motion = velocity_ * dt;
+  const Eigen::Vector3d next = moved(pose_, motion);
+  blocked_by_ = touchedObstacle(world_, next.head<2>(), params_.radius);
+  if (blocked_by_.empty())
+  {
+    pose_ = next;
+  }
+  else
+  {
+    velocity_.setZero();
+    motion.setZero();
+  }
+
+  const auto noise = [&] {
+    return 1.0 + params_.odometry_noise * gaussian(rng_);
+  };
+  const double distance = motion.head<2>().norm();
+  const double scale = (1.0 + params_.odometry_drift) * noise();
+  const double turned = motion.z() * noise() + params_.odometry_turn_drift * distance;
+  const Eigen::Vector3d measured(scale * motion.x(), scale * motion.y(), turned);
+  odometry_ = moved(odometry_, measured);
+  measured_ = measured / dt;
+}
+
+Eigen::Isometry3d Nomad::pose() const
+{
+  return toIsometry(pose_);
+}
+
+Eigen::Isometry3d Nomad::cameraPose() const
+{
+  return toIsometry(pose_) * world_.camera_on_base;
+}
+
+Eigen::Isometry3d Nomad::odometry() const
+{
+  return toIsometry(odometry_);
+}
+
+}  // namespace view_servo::sim
