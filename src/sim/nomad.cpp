@@ -79,10 +79,15 @@ void Nomad::setPose(const Eigen::Isometry3d& pose)
     throw std::invalid_argument("the base cannot stand there: " + touched + " is in the way");
   }
   pose_ << at, yawOf(pose);
+  halt();
+  blocked_by_.clear();
+}
+
+void Nomad::halt()
+{
   velocity_.setZero();
   commanded_.setZero();
   measured_.setZero();
-  blocked_by_.clear();
 }
 
 bool Nomad::command(const Velocity& velocity)

@@ -52,6 +52,9 @@ public:
   /** What to do from now on, as far as the limits allow. @return false, and nothing changes, when it is not finite. */
   bool command(const Velocity& velocity);
 
+  /** Stands still at once, by its brakes. */
+  void halt();
+
   /** Moves on by `dt` [s], > 0; obstacles stop it. */
   void step(double dt);
 

@@ -49,7 +49,6 @@ struct SimulatedCamera::Context
     {
       throw std::runtime_error("OSMesa gives no OpenGL context");
     }
-    makeCurrent();
   }
 
   ~Context()
@@ -59,6 +58,12 @@ struct SimulatedCamera::Context
 
   Context(const Context&) = delete;
   Context& operator=(const Context&) = delete;
+
+  /** To be called when done: the next call may come from another thread. */
+  static void release()
+  {
+    OSMesaMakeCurrent(nullptr, nullptr, GL_UNSIGNED_BYTE, 0, 0);
+  }
 
   void makeCurrent()
   {
@@ -91,6 +96,7 @@ struct SimulatedCamera::Context
 
   void load(const World& world, const std::vector<std::string>& groups)
   {
+    makeCurrent();
     const std::vector<GLuint> textures = loadTextures(world.textures);
     glEnable(GL_DEPTH_TEST);
     glEnable(GL_TEXTURE_2D);
@@ -99,8 +105,10 @@ struct SimulatedCamera::Context
     glClearColor(background, background, background, 1.0F);
     list = glGenLists(1);
     glNewList(list, GL_COMPILE);
-    for (const Surface& surface : world.surfaces)
+    // Boxes come after walls in a world and stand before them: what is hidden need not be drawn.
+    for (auto next = world.surfaces.rbegin(); next != world.surfaces.rend(); ++next)
     {
+      const Surface& surface = *next;
       if (!surface.group.empty() && std::find(groups.begin(), groups.end(), surface.group) == groups.end())
       {
         continue;
@@ -120,6 +128,7 @@ struct SimulatedCamera::Context
       glEnd();
     }
     glEndList();
+    release();
   }
 
   /** The first row of the image ends up first in the buffer: OpenGL's lowest. */
@@ -142,6 +151,7 @@ struct SimulatedCamera::Context
     glLoadMatrixd(view.data());
     glCallList(list);
     glFinish();
+    release();
   }
 };
 

@@ -47,7 +47,7 @@ const YAML::Node& requireKeys(const YAML::Node& node, const std::string& what, s
     const auto key = entry.first.as<std::string>();
     if (std::find(known.begin(), known.end(), key) == known.end())
     {
-      fail(entry.first, "unknown key '" + key + "' of " + what);
+      fail(entry.first, std::string("unknown key '").append(key).append("' of ").append(what));
     }
   }
   return node;

@@ -1,0 +1,323 @@
+// Copyright (c) 2026, the view_servo authors
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include "ros/robot_messages.h"
+#include "sim/renderer.h"
+#include "sim/world.h"
+#include "view_servo/SetLight.h"
+#include "view_servo/SetPose.h"
+#include "view_servo/ros/conversions.h"
+#include "view_servo/ros/node_base.h"
+#include "view_servo/ros/parameters.h"
+
+#include <image_transport/image_transport.h>
+#include <ros/console.h>
+#include <ros/package.h>
+#include <ros/param.h>
+#include <ros/rate.h>
+#include <ros/subscriber.h>
+#include <ros/wall_timer.h>
+#include <sensor_msgs/image_encodings.h>
+
+#include <algorithm>
+#include <atomic>
+#include <chrono>
+#include <cmath>
+#include <cstdint>
+#include <memory>
+#include <mutex>
+#include <sstream>
+#include <stdexcept>
+#include <string>
+#include <thread>
+#include <vector>
+
+namespace view_servo::sim
+{
+/** What the nodes of all simulated robots can be told. */
+struct SimulationParams
+{
+  std::string world = "desk";
+  std::string start;
+  std::string groups;
+  int seed = 1;
+  double image_noise = -1.0;
+  double focal_length_error = 0.0;
+  double control_rate = 50.0;
+
+  void read(ParameterReader& reader)
+  {
+    reader.read("world", world);
+    reader.read("start", start);
+    reader.read("groups", groups);
+    reader.read("seed", seed);
+    reader.read("image_noise", image_noise);
+    reader.read("focal_length_error", focal_length_error);
+    reader.read("control_rate", control_rate);
+    reader.require(seed >= 0, "~seed must not be negative");
+    reader.require(std::isfinite(image_noise), "~image_noise must be finite");
+    reader.require(focal_length_error > -0.5 && focal_length_error < 0.5,
+                   "~focal_length_error must lie in (-0.5, 0.5)");
+    reader.require(control_rate >= 10.0 && control_rate <= 1000.0, "~control_rate must lie in [10, 1000] Hz");
+  }
+
+  /** The world of that name, or in that file, with the noise asked for. */
+  World load(RobotKind robot) const
+  {
+    const bool is_file = world.find('/') != std::string::npos || world.find(".yaml") != std::string::npos;
+    World result =
+        readWorld(is_file ? world : ros::package::getPath("view_servo") + "/config/worlds/" + world + ".yaml");
+    if (result.robot != robot)
+    {
+      throw std::invalid_argument("world '" + result.name + "' is for another robot");
+    }
+    if (image_noise >= 0.0)
+    {
+      result.quality.noise = image_noise;
+    }
+    return result;
+  }
+
+  std::vector<std::string> groupNames() const
+  {
+    std::vector<std::string> names;
+    std::istringstream stream(groups);
+    for (std::string name; std::getline(stream, name, ',');)
+    {
+      names.push_back(name);
+    }
+    return names;
+  }
+};
+
+/**
+ * A robot with a camera in a simulated world, on wall time.
+ *
+ * Parameters, all private:
+ *  - `~world` (string, default "desk"): a world file, or the name of one in `config/worlds/`;
+ *  - `~start` (string, default ""): where to begin, one of the world's starts; "" = its goal;
+ *  - `~groups` (string, default ""): groups of surfaces to show, separated by commas;
+ *  - `~seed` (int, default 1): of all noise;
+ *  - `~image_noise` (double, default -1 [grey levels]): instead of the world's; negative = the world's;
+ *  - `~focal_length_error` (double, default 0): by which part `camera_info` says the focal lengths too long;
+ *  - `~control_rate` (double, default 50 [Hz]): of the robot's motion and state;
+ *  - those of the robot.
+ *
+ * Publishes:
+ *  - `camera/image_raw` (sensor_msgs/Image, mono8; drawn only when somebody listens), `camera/camera_info`, at the
+ *    world's rate or as fast as it can be drawn;
+ *  - `ground_truth` (geometry_msgs/PoseStamped): the camera's true pose in `world`, with the stamp of each image;
+ *  - `/diagnostics` (diagnostic_msgs/DiagnosticArray): 1 Hz;
+ *  - what the robot says of itself.
+ *
+ * Subscribes:
+ *  - `cmd_vel`: what to do until the next command, or for 0.2 s of wall time, after which the robot brakes.
+ *
+ * Services:
+ *  - `~set_pose` (view_servo/SetPose), `~set_light` (view_servo/SetLight).
+ *
+ * The camera draws in a thread of its own, since that takes longer than a cycle of control. A Robot is a type with
+ *  - `KIND`, `Params` with `read(ParameterReader&)`, `Command` (a message);
+ *  - a constructor from world, seed, parameters and node handle;
+ *  - `command(Command)`, `halt()`, `step(dt)`, `setPose(pose)`, `cameraPose()`, `publish(stamp)`, `diagnose(status)`.
+ */
+template <typename Robot>
+class SimulationNode : private NodeBase
+{
+public:
+  SimulationNode(const ros::NodeHandle& nh, const ros::NodeHandle& private_nh)
+    : NodeBase(nh, private_nh), images_(nh), last_step_(Clock::now())
+  {
+    bool sim_time = false;
+    if (ros::param::get("/use_sim_time", sim_time) && sim_time)
+    {
+      throw std::runtime_error("/use_sim_time is set, but simulated robots run on wall time");
+    }
+    ParameterReader reader(private_nh_);
+    params_.read(reader);
+    typename Robot::Params robot_params;
+    robot_params.read(reader);
+    reader.finish();
+    world_ = params_.load(Robot::KIND);
+    camera_ = std::make_unique<SimulatedCamera>(world_, params_.groupNames(), static_cast<std::uint64_t>(params_.seed));
+    robot_ = std::make_unique<Robot>(world_, static_cast<std::uint64_t>(params_.seed), robot_params, nh_);
+    robot_->setPose(world_.goal);
+    if (!params_.start.empty())
+    {
+      robot_->setPose(world_.start(params_.start));  // of an arm's solutions the one nearest to the goal's
+    }
+
+    image_publisher_ = images_.advertiseCamera("camera/image_raw", 2);
+    ground_truth_publisher_ = nh_.advertise<geometry_msgs::PoseStamped>("ground_truth", 10);
+    command_subscriber_ = nh_.subscribe("cmd_vel", 1, &SimulationNode::command, this);
+    set_pose_service_ = serve("set_pose", &SimulationNode::setPose, this);
+    set_light_service_ = serve("set_light", &SimulationNode::setLight, this);
+    diagnostics_.add("robot", this, &SimulationNode::diagnose);
+    control_timer_ = nh_.createWallTimer(ros::WallDuration(1.0 / params_.control_rate), &SimulationNode::control, this);
+    camera_thread_ = std::thread(&SimulationNode::runCamera, this);
+    ROS_INFO_STREAM("world '" << world_.name << "', start '" << params_.start << "'");
+  }
+
+  ~SimulationNode()
+  {
+    running_ = false;
+    camera_thread_.join();
+  }
+
+private:
+  using Clock = std::chrono::steady_clock;
+
+  /** A command holds so long [s]; with a cycle of control the robot stands within 0.25 s. */
+  static constexpr double COMMAND_TIMEOUT = 0.2;
+
+  static double since(Clock::time_point then)
+  {
+    return std::chrono::duration<double>(Clock::now() - then).count();
+  }
+
+  /** Moves the robot on to now. The robot's mutex is held. */
+  void advance()
+  {
+    constexpr double MAX_STEP = 0.005;  // [s]
+    if (commanded_ && since(last_command_) > COMMAND_TIMEOUT)
+    {
+      robot_->halt();
+      commanded_ = false;
+      ROS_WARN_STREAM_THROTTLE(10.0, "no command on " << command_subscriber_.getTopic() << " for " << COMMAND_TIMEOUT
+                                                      << " s: the robot stands");
+    }
+    const double elapsed = since(last_step_);
+    last_step_ = Clock::now();
+    const int steps = static_cast<int>(std::ceil(elapsed / MAX_STEP));
+    for (int i = 0; i < steps; ++i)
+    {
+      robot_->step(elapsed / steps);
+    }
+  }
+
+  void control(const ros::WallTimerEvent& /*event*/)
+  {
+    const std::lock_guard<std::mutex> lock(robot_mutex_);
+    advance();
+    robot_->publish(ros::Time::now());
+  }
+
+  void command(const typename Robot::Command::ConstPtr& message)
+  {
+    const std::lock_guard<std::mutex> lock(robot_mutex_);
+    advance();
+    if (!robot_->command(*message))
+    {
+      ROS_ERROR_STREAM_THROTTLE(
+          1.0, "refused a command on " << command_subscriber_.getTopic() << ": not finite, or in another frame");
+      return;
+    }
+    last_command_ = Clock::now();
+    commanded_ = true;
+  }
+
+  void setPose(const SetPose::Request& request, SetPose::Response& response)
+  {
+    const std::lock_guard<std::mutex> lock(robot_mutex_);
+    robot_->setPose(toIsometry(request.pose));
+    advance();
+    response.success = true;
+    response.message = "moved";
+  }
+
+  void setLight(const SetLight::Request& request, SetLight::Response& response)
+  {
+    if (!(request.gain > 0.0 && std::isfinite(request.gain)) || !std::isfinite(request.offset) ||
+        !(std::abs(request.gradient) < 2.0))
+    {
+      throw std::invalid_argument("the gain must be positive, the offset finite, the gradient within (-2, 2)");
+    }
+    const std::lock_guard<std::mutex> lock(camera_mutex_);
+    camera_->setLight({ request.gain, request.offset, request.gradient });
+    response.success = true;
+    response.message = "lit";
+  }
+
+  void runCamera()
+  {
+    try
+    {
+      ros::WallRate rate(world_.camera_rate);
+      while (running_ && ros::ok())
+      {
+        takeImage();
+        rate.sleep();
+      }
+    }
+    catch (const std::exception& error)
+    {
+      ROS_FATAL_STREAM("the camera fails: " << error.what());
+      ros::shutdown();
+    }
+  }
+
+  void takeImage()
+  {
+    constexpr int EXPOSED = 5;  // poses over the exposure
+    std::vector<Eigen::Isometry3d> poses;
+    ros::Time stamp;
+    {
+      const std::lock_guard<std::mutex> lock(robot_mutex_);
+      advance();
+      stamp = ros::Time::now();
+      const Waypoint now{ stamp.toSec(), robot_->cameraPose() };
+      poses.push_back(now.pose);
+      const double exposure = world_.quality.exposure;
+      if (exposure > 0.0 && !last_view_.empty() && last_view_.front().time < now.time)
+      {
+        const std::vector<Waypoint> way = { last_view_.front(), now };
+        for (int i = 1; i < EXPOSED; ++i)
+        {
+          poses.push_back(poseAt(way, now.time - exposure * i / (EXPOSED - 1)));
+        }
+      }
+      last_view_ = { now };
+    }
+    sensor_msgs::CameraInfo info = toCameraInfo(world_, params_.focal_length_error, stamp);
+    if (image_publisher_.getNumSubscribers() > 0)
+    {
+      cv::Mat image;
+      {
+        const std::lock_guard<std::mutex> lock(camera_mutex_);
+        image = camera_->capture(poses);
+      }
+      image_publisher_.publish(toImage(image, sensor_msgs::image_encodings::MONO8, info.header), info);
+    }
+    ground_truth_publisher_.publish(toGroundTruth(poses.front(), stamp));
+  }
+
+  void diagnose(diagnostic_updater::DiagnosticStatusWrapper& status)
+  {
+    const std::lock_guard<std::mutex> lock(robot_mutex_);
+    robot_->diagnose(status);
+    status.add("world", world_.name);
+  }
+
+  SimulationParams params_;
+  World world_;
+  image_transport::ImageTransport images_;
+  std::mutex camera_mutex_;
+  std::unique_ptr<SimulatedCamera> camera_;
+  std::mutex robot_mutex_;
+  std::unique_ptr<Robot> robot_;
+  Clock::time_point last_step_;
+  Clock::time_point last_command_;
+  bool commanded_ = false;
+  std::vector<Waypoint> last_view_;  // the camera's pose at the last image; empty before the first
+  std::atomic<bool> running_{ true };
+  image_transport::CameraPublisher image_publisher_;
+  ros::Publisher ground_truth_publisher_;
+  ros::Subscriber command_subscriber_;
+  ros::ServiceServer set_pose_service_;
+  ros::ServiceServer set_light_service_;
+  ros::WallTimer control_timer_;
+  std::thread camera_thread_;
+};
+
+}  // namespace view_servo::sim

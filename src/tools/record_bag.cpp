@@ -1,0 +1,746 @@
+// Copyright (c) 2026, the view_servo authors
+// SPDX-License-Identifier: BSD-3-Clause
+#include "ros/robot_messages.h"
+#include "sim/nomad.h"
+#include "sim/puma.h"
+#include "sim/renderer.h"
+#include "sim/world.h"
+#include "view_servo/ros/conversions.h"
+#include "view_servo/views/image_io.h"
+
+#include <ros/package.h>
+#include <rosbag/bag.h>
+#include <sensor_msgs/image_encodings.h>
+#include <tf2_msgs/TFMessage.h>
+#include <CLI/CLI.hpp>
+#include <Eigen/Geometry>
+#include <boost/make_shared.hpp>
+#include <opencv2/core/utils/logger.hpp>
+
+#include <fcntl.h>
+#include <unistd.h>
+
+#include <cmath>
+#include <cstdint>
+#include <cstdio>
+#include <filesystem>
+#include <fstream>
+#include <iostream>
+#include <iterator>
+#include <limits>
+#include <memory>
+#include <optional>
+#include <sstream>
+#include <stdexcept>
+#include <string>
+#include <system_error>
+#include <vector>
+
+/** @file
+ * `record_bag WORLD TRAJECTORY OUT.bag`: drives a simulated robot along a trajectory, without a ROS master, and writes
+ * what it would publish, with the ground truth. `record_bag --images FOLDER OUT.bag`: the same of a recorded walk. The
+ * same command writes the same bytes. Exit status: 0 written, 2 bad input, with one line on standard error that names
+ * the file or option; then there is no file.
+ */
+namespace
+{
+using namespace view_servo;
+namespace fs = std::filesystem;
+
+enum ExitStatus
+{
+  WRITTEN = 0,
+  BAD_INPUT = 2
+};
+
+constexpr char PACKAGE[] = "view_servo";
+constexpr char IMAGE_TOPIC[] = "/camera/image_raw";
+constexpr char CAMERA_INFO_TOPIC[] = "/camera/camera_info";
+constexpr char GROUND_TRUTH_TOPIC[] = "/ground_truth";
+constexpr char ODOMETRY_TOPIC[] = "/odom";
+constexpr char JOINT_STATES_TOPIC[] = "/joint_states";
+constexpr char TF_TOPIC[] = "/tf";
+constexpr char TF_STATIC_TOPIC[] = "/tf_static";
+
+constexpr int STEPS_PER_SECOND = 100;  // of the simulation
+constexpr double DT = 1.0 / STEPS_PER_SECOND;
+constexpr double MAX_DURATION = 3600.0;  // of a trajectory [s]
+constexpr double TRACKING_GAIN = 2.0;    // of the way back to the trajectory [1/s]
+constexpr int BLUR_POSES = 5;            // seen during an exposure
+
+/** Something the user can put right; what() names the file or option. */
+class BadInput : public std::runtime_error
+{
+public:
+  using std::runtime_error::runtime_error;
+};
+
+/** What is not set is as the world says, or perfect. */
+struct Options
+{
+  std::vector<std::string> names;
+  std::string images;
+  double rate = 4.0;            // of images [Hz]
+  double odometry_rate = 20.0;  // or of encoders [Hz]
+  double start_time = 1000.0;   // [s]
+  std::uint64_t seed = 1;
+  std::vector<std::string> groups;
+  std::string urdf;
+  double focal_length_error = 0.0;  // as a part
+  std::optional<double> image_noise;
+  std::optional<double> light_gain;
+  std::optional<double> light_offset;
+  std::optional<double> odometry_drift;
+  std::optional<double> odometry_noise;
+  std::optional<double> encoder_noise;
+};
+
+/** Keeps standard error quiet: libraries write there on their own, and users are promised one line. */
+class QuietStandardError
+{
+public:
+  QuietStandardError() : standard_error_(dup(STDERR_FILENO))
+  {
+    const int nowhere = open("/dev/null", O_WRONLY | O_CLOEXEC);
+    dup2(nowhere, STDERR_FILENO);
+    close(nowhere);
+  }
+  ~QuietStandardError()
+  {
+    std::cerr.flush();
+    std::fflush(stderr);
+    dup2(standard_error_, STDERR_FILENO);
+    close(standard_error_);
+  }
+  QuietStandardError(const QuietStandardError&) = delete;
+  QuietStandardError& operator=(const QuietStandardError&) = delete;
+
+private:
+  int standard_error_;
+};
+
+/** A bag that appears under its name when it is complete. */
+class BagWriter
+{
+public:
+  explicit BagWriter(const std::string& file) : file_(file), partial_(file + ".partial")
+  {
+    if (fs::is_directory(file_))
+    {
+      throw BadInput("cannot write '" + file_ + "': it is a folder");
+    }
+    explained([this] { bag_->open(partial_, rosbag::bagmode::Write); });
+    bag_->setCompression(rosbag::compression::BZ2);
+  }
+
+  ~BagWriter()
+  {
+    try
+    {
+      bag_->close();
+    }
+    catch (const rosbag::BagException&)
+    {
+      static_cast<void>(bag_.release());  // its destructor would try once more, and end the program
+    }
+    std::error_code ignored;
+    fs::remove(partial_, ignored);
+  }
+  BagWriter(const BagWriter&) = delete;
+  BagWriter& operator=(const BagWriter&) = delete;
+
+  template <typename Message>
+  void write(const std::string& topic, const ros::Time& stamp, const Message& message)
+  {
+    explained([&] { bag_->write(topic, stamp, message); });
+  }
+
+  /** Players keep it for those who come later. */
+  template <typename Message>
+  void writeLatched(const std::string& topic, const ros::Time& stamp, const Message& message)
+  {
+    const auto header = boost::make_shared<ros::M_string>();
+    (*header)["topic"] = topic;
+    (*header)["type"] = ros::message_traits::datatype(message);
+    (*header)["md5sum"] = ros::message_traits::md5sum(message);
+    (*header)["message_definition"] = ros::message_traits::definition(message);
+    (*header)["latching"] = "1";
+    explained([&] { bag_->write(topic, stamp, message, header); });
+  }
+
+  void finish()
+  {
+    explained([this] {
+      bag_->close();
+      fs::rename(partial_, file_);
+    });
+  }
+
+private:
+  /** Does it, and names the file when that fails. */
+  template <typename Action>
+  void explained(const Action& action)
+  {
+    try
+    {
+      action();
+    }
+    catch (const std::exception& error)
+    {
+      throw BadInput("cannot write '" + file_ + "': " + error.what());
+    }
+  }
+
+  std::string file_;
+  std::string partial_;
+  std::unique_ptr<rosbag::Bag> bag_ = std::make_unique<rosbag::Bag>();
+};
+
+tf2_msgs::TFMessage toTf(const geometry_msgs::TransformStamped& transform)
+{
+  tf2_msgs::TFMessage message;
+  message.transforms.push_back(transform);
+  return message;
+}
+
+/** An image and its calibration, both with the stamp of the calibration. */
+void writeImage(BagWriter& bag, const cv::Mat& image, const sensor_msgs::CameraInfo& info)
+{
+  bag.write(CAMERA_INFO_TOPIC, info.header.stamp, info);
+  bag.write(IMAGE_TOPIC, info.header.stamp, toImage(image, sensor_msgs::image_encodings::MONO8, info.header));
+}
+
+ros::Duration seconds(double value)
+{
+  ros::Duration duration;
+  duration.fromNSec(std::llround(1e9 * value));
+  return duration;
+}
+
+ros::Time startOf(const Options& options)
+{
+  return ros::Time() + seconds(options.start_time);
+}
+
+// ------------------------------------------------------------------------------------------------ simulated robots
+
+/** [v; ω] of a frame, in that frame [m/s, rad/s]. */
+using Twist = Eigen::Matrix<double, 6, 1>;
+
+/** A robot that a trajectory leads. */
+class Robot
+{
+public:
+  virtual ~Robot() = default;
+  /** World from the frame whose poses a trajectory holds. */
+  virtual Eigen::Isometry3d pose() const = 0;
+  /** World from the true optical frame. */
+  virtual Eigen::Isometry3d cameraPose() const = 0;
+  /** Moves that frame for DT. @return what keeps it from doing so; empty: nothing. */
+  virtual std::string move(const Twist& twist) = 0;
+  /** Writes what holds for the whole bag. */
+  virtual void writeCalibration(BagWriter& bag, const ros::Time& stamp) const = 0;
+  /** Writes what its sensors, apart from the camera, say now. */
+  virtual void writeSensors(BagWriter& bag, const ros::Time& stamp) = 0;
+};
+
+class NomadRobot : public Robot
+{
+public:
+  NomadRobot(const sim::World& world, const sim::NomadParams& params, const Eigen::Isometry3d& start)
+    : world_(world), nomad_(world, params)
+  {
+    nomad_.setPose(start);
+  }
+
+  Eigen::Isometry3d pose() const override
+  {
+    return nomad_.pose();
+  }
+
+  Eigen::Isometry3d cameraPose() const override
+  {
+    return nomad_.cameraPose();
+  }
+
+  std::string move(const Twist& twist) override
+  {
+    nomad_.command({ twist(0), twist(1), twist(5) });
+    nomad_.step(DT);
+    return nomad_.blockedBy().empty() ? "" : nomad_.blockedBy() + " is in the way";
+  }
+
+  void writeCalibration(BagWriter& bag, const ros::Time& stamp) const override
+  {
+    bag.writeLatched(TF_STATIC_TOPIC, stamp,
+                     toTf(sim::toTransform(world_.camera_on_base, sim::BASE_FRAME, sim::CAMERA_FRAME, stamp)));
+  }
+
+  void writeSensors(BagWriter& bag, const ros::Time& stamp) override
+  {
+    bag.write(TF_TOPIC, stamp, toTf(sim::toTransform(nomad_.odometry(), sim::ODOM_FRAME, sim::BASE_FRAME, stamp)));
+    bag.write(ODOMETRY_TOPIC, stamp, sim::toOdometry(nomad_, stamp));
+  }
+
+private:
+  const sim::World& world_;
+  sim::Nomad nomad_;
+};
+
+class PumaRobot : public Robot
+{
+public:
+  PumaRobot(const sim::World& world, const std::string& urdf, const sim::PumaParams& params,
+            const Eigen::Isometry3d& start)
+    : world_(world), puma_(urdf, params)
+  {
+    if (!puma_.setCameraPose(world.robot_base.inverse() * start))
+    {
+      throw BadInput("its start is out of the arm's reach");
+    }
+  }
+
+  Eigen::Isometry3d pose() const override
+  {
+    return cameraPose();
+  }
+
+  Eigen::Isometry3d cameraPose() const override
+  {
+    return world_.robot_base * puma_.cameraPose();
+  }
+
+  std::string move(const Twist& twist) override
+  {
+    puma_.command(twist);
+    puma_.step(DT);
+    return puma_.state() == sim::Puma::State::AT_LIMIT ? puma_.message() : "";
+  }
+
+  void writeCalibration(BagWriter&, const ros::Time&) const override
+  {
+  }
+
+  void writeSensors(BagWriter& bag, const ros::Time& stamp) override
+  {
+    const sim::Puma::Joints joints = puma_.measuredJoints();
+    const Eigen::Isometry3d camera = puma_.nominalCameraPose(joints);
+    bag.write(TF_TOPIC, stamp, toTf(sim::toTransform(camera, sim::BASE_FRAME, sim::CAMERA_FRAME, stamp)));
+    bag.write(JOINT_STATES_TOPIC, stamp, sim::toJointState(puma_, joints, stamp));
+  }
+
+private:
+  const sim::World& world_;
+  sim::Puma puma_;
+};
+
+/** Rotation vector. */
+Eigen::Vector3d logOf(const Eigen::Matrix3d& rotation)
+{
+  const Eigen::AngleAxisd turn(rotation);
+  return turn.angle() * turn.axis();
+}
+
+/** The twist of `from` that would take it to `to` in a second. */
+Twist twistBetween(const Eigen::Isometry3d& from, const Eigen::Isometry3d& to)
+{
+  Twist twist;
+  twist << from.linear().transpose() * (to.translation() - from.translation()),
+      logOf(from.linear().transpose() * to.linear());
+  return twist;
+}
+
+/** As fast as the trajectory moves, and back to it. @param next where the trajectory is DT later. */
+Twist trackingTwist(const Eigen::Isometry3d& pose, const Eigen::Isometry3d& wanted, const Eigen::Isometry3d& next)
+{
+  const Eigen::Matrix3d wanted_in_pose = pose.linear().transpose() * wanted.linear();
+  const Twist ahead = twistBetween(wanted, next) / DT;
+  Twist twist = TRACKING_GAIN * twistBetween(pose, wanted);
+  twist.head<3>() += wanted_in_pose * ahead.head<3>();
+  twist.tail<3>() += wanted_in_pose * ahead.tail<3>();
+  return twist;
+}
+
+/** Where the camera is while it exposes: around `now`, as fast as it came there from where it was DT before. */
+std::vector<Eigen::Isometry3d> posesOfExposure(const Eigen::Isometry3d& before, const Eigen::Isometry3d& now,
+                                               double exposure)
+{
+  if (exposure == 0.0)
+  {
+    return { now };
+  }
+  const Twist motion = twistBetween(before, now) / DT;
+  std::vector<Eigen::Isometry3d> poses;
+  for (int i = 0; i < BLUR_POSES; ++i)
+  {
+    const double time = exposure * (static_cast<double>(i) / (BLUR_POSES - 1) - 0.5);
+    const Eigen::Vector3d turn = time * motion.tail<3>();
+    Eigen::Isometry3d pose = now;
+    pose.translation() += before.linear() * (time * motion.head<3>());
+    if (turn.norm() > 0.0)
+    {
+      pose.linear() = now.linear() * Eigen::AngleAxisd(turn.norm(), turn.normalized()).toRotationMatrix();
+    }
+    poses.push_back(pose);
+  }
+  return poses;
+}
+
+/** Whether something that happens at a rate [Hz], the first time at step 0, does so at this step. */
+bool isDue(int step, double rate)
+{
+  constexpr double ROUNDING = 1e-9;
+  const auto count = [rate](int at) {
+    return std::floor(at * rate * DT + ROUNDING);
+  };
+  return step == 0 || count(step) > count(step - 1);
+}
+
+/** Where the package's files lie: in the source tree, or where they were installed. */
+fs::path packageFolder()
+{
+  const std::string found = ros::package::getPath(PACKAGE);
+  return found.empty()
+             ? fs::read_symlink("/proc/self/exe").parent_path().parent_path().parent_path() / "share" / PACKAGE
+             : fs::path(found);
+}
+
+/** @param name of a file, or of one of the package's worlds. */
+sim::World worldOf(const std::string& name)
+{
+  if (fs::exists(name))
+  {
+    return sim::readWorld(name);
+  }
+  const fs::path folder = packageFolder() / "config" / "worlds";
+  const fs::path file = folder / (name + ".yaml");
+  if (!fs::exists(file))
+  {
+    throw BadInput("there is no world '" + name + "': neither a file nor one in '" + folder.string() + "'");
+  }
+  return sim::readWorld(file.string());
+}
+
+std::string textOf(const std::string& path)
+{
+  std::ifstream file(path);
+  std::string text(std::istreambuf_iterator<char>(file), {});
+  if (!file)
+  {
+    throw BadInput("cannot read '" + path + "'");
+  }
+  return text;
+}
+
+void refuse(const std::optional<double>& value, const std::string& option, const std::string& reason)
+{
+  if (value)
+  {
+    throw BadInput(option + ": " + reason);
+  }
+}
+
+std::unique_ptr<Robot> makeRobot(const sim::World& world, const Options& options, const Eigen::Isometry3d& start)
+{
+  if (world.robot == sim::RobotKind::NOMAD)
+  {
+    refuse(options.encoder_noise, "--encoder-noise", "the robot of world '" + world.name + "' has no arm");
+    sim::NomadParams params;
+    params.odometry_drift = options.odometry_drift.value_or(0.0);
+    params.odometry_noise = options.odometry_noise.value_or(0.0);
+    params.seed = options.seed;
+    return std::make_unique<NomadRobot>(world, params, start);
+  }
+  const std::string reason = "the robot of world '" + world.name + "' has no wheels";
+  refuse(options.odometry_drift, "--odometry-drift", reason);
+  refuse(options.odometry_noise, "--odometry-noise", reason);
+  sim::PumaParams params;
+  params.encoder_noise = options.encoder_noise.value_or(0.0);
+  params.seed = options.seed;
+  const std::string urdf = options.urdf.empty() ? (packageFolder() / "urdf" / "puma560.urdf").string() : options.urdf;
+  return std::make_unique<PumaRobot>(world, textOf(urdf), params, start);
+}
+
+void recordSimulation(const std::string& world_name, const std::string& trajectory_name, const std::string& file,
+                      const Options& options)
+{
+  sim::World world = worldOf(world_name);
+  world.quality.noise = options.image_noise.value_or(world.quality.noise);
+  world.light.gain = options.light_gain.value_or(world.light.gain);
+  world.light.offset = options.light_offset.value_or(world.light.offset);
+  const std::vector<sim::Waypoint>& trajectory = world.trajectory(trajectory_name);
+  const double duration = trajectory.back().time - trajectory.front().time;
+  const auto wanted_at = [&](int step) {
+    return sim::poseAt(trajectory, trajectory.front().time + step * DT);
+  };
+  const auto fault = [&](const std::string& what) {
+    return BadInput("trajectory '" + trajectory_name + "' of world '" + world.name + "': " + what);
+  };
+  if (duration > MAX_DURATION)
+  {
+    throw fault("it takes more than an hour");
+  }
+
+  sim::SimulatedCamera camera(world, options.groups, options.seed);
+  std::unique_ptr<Robot> robot;
+  try
+  {
+    robot = makeRobot(world, options, trajectory.front().pose);
+  }
+  catch (const std::exception& error)
+  {
+    throw fault(error.what());
+  }
+
+  BagWriter bag(file);
+  const ros::Time start = startOf(options);
+  robot->writeCalibration(bag, start);
+  Eigen::Isometry3d camera_before = robot->cameraPose();
+  const int last_step = static_cast<int>(std::lround(duration / DT));
+  for (int step = 0; step <= last_step; ++step)
+  {
+    const ros::Time stamp = start + seconds(step * DT);
+    const Eigen::Isometry3d camera_pose = robot->cameraPose();
+    const bool image_due = isDue(step, options.rate);
+    const bool sensors_due = isDue(step, options.odometry_rate);
+    if (sensors_due)
+    {
+      robot->writeSensors(bag, stamp);
+    }
+    if (sensors_due || image_due)
+    {
+      bag.write(GROUND_TRUTH_TOPIC, stamp, sim::toGroundTruth(camera_pose, stamp));
+    }
+    if (image_due)
+    {
+      writeImage(bag, camera.capture(posesOfExposure(camera_before, camera_pose, world.quality.exposure)),
+                 sim::toCameraInfo(world, options.focal_length_error, stamp));
+    }
+    camera_before = camera_pose;
+    const std::string obstruction = robot->move(trackingTwist(robot->pose(), wanted_at(step), wanted_at(step + 1)));
+    if (!obstruction.empty() && step < last_step)
+    {
+      throw fault(obstruction + " after " + std::to_string(step * DT) + " s");
+    }
+  }
+  bag.finish();
+}
+
+// ------------------------------------------------------------------------------------------------- recorded images
+
+struct PosedImage
+{
+  std::string file;
+  Eigen::Isometry3d pose;  // world from optical frame
+};
+
+/** Lines of a file's name and the 16 numbers of its pose, row by row; '#' starts a remark. */
+std::vector<PosedImage> readPoses(const fs::path& path)
+{
+  std::istringstream lines(textOf(path.string()));
+  std::vector<PosedImage> images;
+  int number = 0;
+  for (std::string line; std::getline(lines, line);)
+  {
+    ++number;
+    std::istringstream words(line.substr(0, line.find('#')));
+    PosedImage image;
+    if (!(words >> image.file))
+    {
+      continue;
+    }
+    const std::vector<double> values{ std::istream_iterator<double>(words), std::istream_iterator<double>() };
+    constexpr double TOLERANCE = 1e-3;  // of numbers written with few digits
+    Eigen::Matrix4d matrix = Eigen::Matrix4d::Zero();
+    if (words.eof() && values.size() == 16)
+    {
+      matrix = Eigen::Map<const Eigen::Matrix<double, 4, 4, Eigen::RowMajor>>(values.data());
+    }
+    const Eigen::Matrix3d rotation = matrix.topLeftCorner<3, 3>();
+    if (!matrix.allFinite() || !rotation.isUnitary(TOLERANCE) || rotation.determinant() < 0.0 ||
+        !matrix.row(3).isApprox(Eigen::RowVector4d(0.0, 0.0, 0.0, 1.0)))
+    {
+      throw BadInput(path.string() + ": line " + std::to_string(number) + " is no file's name with a pose");
+    }
+    image.pose = Eigen::Isometry3d(Eigen::Quaterniond(rotation).normalized());
+    image.pose.translation() = matrix.topRightCorner<3, 1>();
+    images.push_back(image);
+  }
+  if (images.empty())
+  {
+    throw BadInput(path.string() + ": no poses");
+  }
+  return images;
+}
+
+Eigen::Matrix3d readIntrinsics(const fs::path& path)
+{
+  std::istringstream text(textOf(path.string()));
+  const std::vector<double> values{ std::istream_iterator<double>(text), std::istream_iterator<double>() };
+  Eigen::Matrix3d k = Eigen::Matrix3d::Zero();
+  if (text.eof() && values.size() == 9)
+  {
+    k = Eigen::Map<const Eigen::Matrix<double, 3, 3, Eigen::RowMajor>>(values.data());
+  }
+  if (!k.allFinite() || !(k(0, 0) > 0.0) || !(k(1, 1) > 0.0) || k(2, 2) != 1.0)
+  {
+    throw BadInput(path.string() + ": no 3 x 3 matrix of intrinsics");
+  }
+  return k;
+}
+
+/** A folder with K.txt, poses.txt (camera to world) and images/; without stamps, so the rate is made up. */
+void recordImages(const std::string& file, const Options& options)
+{
+  const fs::path folder = options.images;
+  const std::vector<PosedImage> images = readPoses(folder / "poses.txt");
+  Camera camera;
+  camera.k = readIntrinsics(folder / "K.txt");
+  camera.projection.leftCols<3>() = camera.k;
+  camera.distortion_model = "plumb_bob";
+  camera.distortion.assign(5, 0.0);
+
+  BagWriter bag(file);
+  std_msgs::Header header;
+  header.frame_id = sim::CAMERA_FRAME;
+  for (std::size_t i = 0; i < images.size(); ++i)
+  {
+    const fs::path path = folder / "images" / images[i].file;
+    const cv::Mat image = readGreyImage(path.string());
+    if (i > 0 && image.size() != cv::Size(camera.width, camera.height))
+    {
+      throw BadInput(path.string() + ": not of the size of those before");
+    }
+    camera.width = image.cols;
+    camera.height = image.rows;
+    header.stamp = startOf(options) + seconds(static_cast<double>(i) / options.rate);
+    bag.write(GROUND_TRUTH_TOPIC, header.stamp, sim::toGroundTruth(images[i].pose, header.stamp));
+    writeImage(bag, image, view_servo::toCameraInfo(camera, header));
+  }
+  bag.finish();
+}
+
+// --------------------------------------------------------------------------------------------------- command line
+
+/** Finite numbers of a range, its ends included. */
+CLI::Validator between(double low, double high)
+{
+  std::ostringstream range;
+  range << "[" << low << ", " << high << "]";
+  return CLI::Validator(
+      [low, high, text = range.str()](const std::string& word) {
+        double value = std::numeric_limits<double>::quiet_NaN();
+        return CLI::detail::lexical_cast(word, value) && value >= low && value <= high
+                   ? std::string()
+                   : "'" + word + "' is no number in " + text;
+      },
+      range.str());
+}
+
+void addOptions(CLI::App& app, Options& options)
+{
+  app.add_option("NAMES", options.names,
+                 "A world's file, or the name of one of the package's; the name of one of its trajectories; and the "
+                 "file to write");
+  CLI::Option* images = app.add_option("--images", options.images,
+                                       "Folder of recorded images with K.txt and poses.txt, instead of a world");
+  app.add_option("--rate", options.rate, "Images a second")
+      ->check(between(0.001, STEPS_PER_SECOND))
+      ->capture_default_str();
+  app.add_option("--start-time", options.start_time, "Of the bag [s]")->check(between(1.0, 4e9))->capture_default_str();
+
+  const auto add = [&](const std::string& name, auto& value, const std::string& description) {
+    CLI::Option* option = app.add_option(name, value, description);
+    images->excludes(option);
+    return option;
+  };
+  add("--odometry-rate", options.odometry_rate, "Readings of odometry or encoders a second")
+      ->check(between(0.001, STEPS_PER_SECOND))
+      ->capture_default_str();
+  add("--seed", options.seed, "Of all noise")->check(CLI::NonNegativeNumber)->capture_default_str();
+  add("--groups", options.groups, "Surfaces to show besides those that always are: groups, joined by commas")
+      ->delimiter(',')
+      ->allow_extra_args(false);
+  add("--image-noise", options.image_noise, "Standard deviation [grey levels]; default: the world's")
+      ->check(between(0.0, 255.0));
+  add("--light-gain", options.light_gain, "Factor of the grey levels; default: the world's")
+      ->check(between(0.001, 100.0));
+  add("--light-offset", options.light_offset, "Added to the grey levels; default: the world's")
+      ->check(between(-255.0, 255.0));
+  add("--focal-length-error", options.focal_length_error, "By which part camera_info has it too long")
+      ->check(between(-0.5, 1.0))
+      ->capture_default_str();
+  add("--odometry-drift", options.odometry_drift, "By which part the Nomad measures distances too long")
+      ->check(between(-0.9, 10.0));
+  add("--odometry-noise", options.odometry_noise, "Standard deviation of its measured motion, as a part of it")
+      ->check(between(0.0, 10.0));
+  add("--encoder-noise", options.encoder_noise, "Standard deviation of the Puma's joint angles [rad]")
+      ->check(between(0.0, 1.0));
+  add("--urdf", options.urdf, "File that describes the Puma; default: the package's");
+}
+
+void record(const Options& options)
+{
+  const QuietStandardError quiet;
+  if (!options.images.empty())
+  {
+    if (options.names.size() != 1)
+    {
+      throw BadInput("say where to: record_bag --images FOLDER OUT.bag");
+    }
+    recordImages(options.names.front(), options);
+    return;
+  }
+  if (options.names.size() != 3)
+  {
+    throw BadInput("say what to record and where to: record_bag WORLD TRAJECTORY OUT.bag");
+  }
+  recordSimulation(options.names[0], options.names[1], options.names[2], options);
+}
+
+/** Messages may have several lines; the user is promised one. */
+std::string oneLine(const std::string& text)
+{
+  std::istringstream lines(text);
+  std::string joined;
+  for (std::string line; std::getline(lines >> std::ws, line);)
+  {
+    joined += (joined.empty() ? "" : " ") + line;
+  }
+  return joined;
+}
+
+}  // namespace
+
+int main(int argc, char** argv)
+{
+  cv::utils::logging::setLogLevel(cv::utils::logging::LOG_LEVEL_SILENT);
+
+  Options options;
+  CLI::App app(
+      "Records a bag of a simulated robot or of a folder of images, with the ground truth:\n"
+      "  record_bag WORLD TRAJECTORY OUT.bag [OPTIONS]\n"
+      "  record_bag --images FOLDER OUT.bag [OPTIONS]",
+      "record_bag");
+  app.footer("Exit status: 0 the bag was written, 2 bad input.");
+  addOptions(app, options);
+  try
+  {
+    app.parse(argc, argv);
+    record(options);
+    return WRITTEN;
+  }
+  catch (const CLI::ParseError& error)
+  {
+    if (error.get_exit_code() == static_cast<int>(CLI::ExitCodes::Success))
+    {
+      return app.exit(error);  // --help
+    }
+    std::cerr << "record_bag: " << oneLine(error.what()) << '\n';
+  }
+  catch (const std::exception& error)
+  {
+    std::cerr << "record_bag: " << oneLine(error.what()) << '\n';
+  }
+  return BAD_INPUT;
+}

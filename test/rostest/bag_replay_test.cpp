@@ -1,0 +1,308 @@
+// Copyright (c) 2026, the view_servo authors
+// SPDX-License-Identifier: BSD-3-Clause
+#include "node_test.h"
+#include "ros/robot_messages.h"
+#include "support/temporary_directory.h"
+
+#include "view_servo/LineMatches.h"
+#include "view_servo/PointMatches.h"
+#include "view_servo/SetView.h"
+#include "view_servo/geometry/homography.h"
+#include "view_servo/views/view_store.h"
+
+#include <geometry_msgs/PoseStamped.h>
+#include <gtest/gtest.h>
+#include <rosbag/bag.h>
+#include <rosbag/view.h>
+#include <signal.h>
+#include <spawn.h>
+#include <sys/wait.h>
+
+#include <algorithm>
+#include <cstdlib>
+#include <fstream>
+#include <map>
+#include <memory>
+#include <string>
+#include <vector>
+
+extern char** environ;
+
+namespace view_servo
+{
+namespace test
+{
+namespace
+{
+/** A base that drives up to a wall with a picture, its only plane, and passes the goal on the way. */
+const std::string WORLD = R"(
+robot: {kind: nomad, camera_height: 1.0}
+camera: {width: 480, height: 360, fx: 400, noise: 1}
+textures:
+  picture: {kind: poster, size: [1024, 512], seed: 5, count: 12}
+rectangles:
+  - {name: picture, size: [4.5, 2.5], position: [2, 0, 1], facing: [-1, 0, 0], texture: picture}
+goal: {x: 0, y: 0}
+trajectories:
+  way:
+    - {time: 0, x: -0.4, y: 0.15}
+    - {time: 2, x: 0, y: 0, yaw_deg: 5}
+    - {time: 3, x: 0.1, y: 0, yaw_deg: -5}
+)";
+constexpr double WALL_X = 2.0;  // of the wall [m]
+
+/** A program with all that it starts, in a process group that ends with this object. */
+class Process
+{
+public:
+  explicit Process(std::vector<std::string> command)
+  {
+    std::vector<char*> argv;
+    for (std::string& word : command)
+    {
+      argv.push_back(word.data());
+    }
+    argv.push_back(nullptr);
+    posix_spawnattr_t attributes;
+    posix_spawnattr_init(&attributes);
+    posix_spawnattr_setflags(&attributes, POSIX_SPAWN_SETPGROUP);
+    posix_spawnattr_setpgroup(&attributes, 0);
+    // The player takes what it is typed as commands.
+    posix_spawn_file_actions_t actions;
+    posix_spawn_file_actions_init(&actions);
+    posix_spawn_file_actions_addopen(&actions, 0, "/dev/null", 0, 0);
+    EXPECT_EQ(posix_spawnp(&pid_, argv[0], &actions, &attributes, argv.data(), environ), 0) << command[0];
+    posix_spawn_file_actions_destroy(&actions);
+    posix_spawnattr_destroy(&attributes);
+  }
+
+  ~Process()
+  {
+    if (pid_ > 0)
+    {
+      kill(-pid_, SIGINT);
+      if (!waitUntil([this] { return waitpid(pid_, nullptr, WNOHANG) == pid_; }))
+      {
+        ADD_FAILURE() << "process " << pid_ << " did not end";
+        kill(-pid_, SIGKILL);
+        waitpid(pid_, nullptr, 0);
+      }
+    }
+  }
+  Process(const Process&) = delete;
+  Process& operator=(const Process&) = delete;
+
+private:
+  pid_t pid_ = 0;
+};
+
+/** Where a camera sees the wall: from (y, z) of the world to pixels. */
+Eigen::Matrix3d imageFromWall(const Camera& camera, const Eigen::Isometry3d& pose)
+{
+  const Eigen::Isometry3d camera_from_world = pose.inverse();
+  Eigen::Matrix3d columns;
+  columns << camera_from_world.linear().col(1), camera_from_world.linear().col(2),
+      camera_from_world * Eigen::Vector3d(WALL_X, 0.0, 0.0);
+  return camera.k * columns;
+}
+
+/** Plays one bag to the matchers, which know its first image as a view. */
+class BagReplayTest : public ::testing::Test
+{
+protected:
+  static void SetUpTestSuite()
+  {
+    directory_ = std::make_unique<TemporaryDirectory>();
+    const std::string world = directory_->path() / "wall.yaml";
+    std::ofstream(world) << WORLD;
+    bag_ = directory_->path() / "run.bag";
+    const std::string command = "'" RECORD_BAG_BINARY "' '" + world + "' way '" + bag_ + "'";
+    ASSERT_EQ(std::system(command.c_str()), 0) << command;
+
+    StoredView first;
+    Camera camera;
+    std::map<ros::Time, Eigen::Isometry3d> poses;
+    const rosbag::Bag bag(bag_);
+    for (const rosbag::MessageInstance& instance : rosbag::View(bag))
+    {
+      if (const auto truth = instance.instantiate<geometry_msgs::PoseStamped>())
+      {
+        poses[truth->header.stamp] = sim::toIsometry(truth->pose);
+      }
+      else if (const auto info = instance.instantiate<sensor_msgs::CameraInfo>())
+      {
+        camera = toCamera(*info);
+      }
+      else if (const auto image = instance.instantiate<sensor_msgs::Image>())
+      {
+        first.image = first.image.empty() ? toGrey(*image, "image") : first.image;
+      }
+    }
+    const Eigen::Matrix3d reference = imageFromWall(camera, poses.begin()->second);
+    for (const auto& [stamp, pose] : poses)
+    {
+      truth_[stamp] = imageFromWall(camera, pose) * reference.inverse();
+    }
+    first.name = "first";
+    for (const char* node : { "point_matcher", "line_matcher" })
+    {
+      ASSERT_TRUE(waitForService(std::string(node) + "/set_view"));
+      ViewStore(viewsDir(node)).save(first, true);
+    }
+  }
+
+  static void TearDownTestSuite()
+  {
+    removeViews("point_matcher");
+    removeViews("line_matcher");
+    directory_.reset();
+  }
+
+  static void setViews()
+  {
+    for (const char* node : { "point_matcher", "line_matcher" })
+    {
+      SetView::Request request;
+      request.view = "first";
+      SetView::Response response;
+      ASSERT_TRUE(ros::service::call(std::string(node) + "/set_view", request, response));
+      ASSERT_TRUE(response.success) << response.message;
+    }
+  }
+
+  static std::vector<std::string> player(const std::vector<std::string>& more)
+  {
+    std::vector<std::string> command{ "rosbag", "play", "--clock", "--quiet", bag_ };
+    command.insert(command.end(), more.begin(), more.end());
+    return command;
+  }
+
+  /** Where the wall's points truly go, from the view to the image of that stamp. */
+  static Eigen::Matrix3d truthAt(const ros::Time& stamp)
+  {
+    const auto found = truth_.find(stamp);
+    EXPECT_NE(found, truth_.end()) << "the bag has no " << stamp;
+    return found != truth_.end() ? found->second : Eigen::Matrix3d(Eigen::Matrix3d::Zero());
+  }
+
+  static void expectTrue(const std::vector<PointMatch>& points, const ros::Time& stamp)
+  {
+    const Eigen::Matrix3d truth = truthAt(stamp);
+    std::vector<double> errors;
+    for (const PointMatch& point : points)
+    {
+      if (point.inlier)
+      {
+        const Eigen::Vector2d expected = transfer(truth, { point.reference_x, point.reference_y });
+        errors.push_back((expected - Eigen::Vector2d(point.current_x, point.current_y)).norm());
+      }
+    }
+    ASSERT_GT(errors.size(), 20u) << stamp;
+    const auto middle = errors.begin() + static_cast<std::ptrdiff_t>(errors.size() / 2);
+    std::nth_element(errors.begin(), middle, errors.end());
+    EXPECT_LT(*middle, 1.0) << stamp;
+  }
+
+  static void expectTrue(const Recorder<PointMatches>& answers)
+  {
+    for (const PointMatches& answer : answers.messages())
+    {
+      EXPECT_EQ(answer.view, "first");
+      EXPECT_EQ(answer.header.frame_id, sim::CAMERA_FRAME);
+      ASSERT_TRUE(answer.homography.valid) << answer.header.stamp;
+      EXPECT_LT(cornerError(toMatrix(answer.homography.h), truthAt(answer.header.stamp)), 1.5) << answer.header.stamp;
+      expectTrue(answer.matches, answer.header.stamp);
+    }
+  }
+
+  static void expectTrue(const Recorder<LineMatches>& answers)
+  {
+    for (const LineMatches& answer : answers.messages())
+    {
+      EXPECT_EQ(answer.view, "first");
+      EXPECT_EQ(answer.header.frame_id, sim::CAMERA_FRAME);
+      EXPECT_GT(answer.matches.size(), 10u) << answer.header.stamp;
+      expectTrue(answer.points, answer.header.stamp);
+    }
+  }
+
+  /** How often the bag began anew between two answers. */
+  template <typename Message>
+  static int restarts(const Recorder<Message>& answers)
+  {
+    int count = 0;
+    ros::Time last;
+    for (const Message& answer : answers.messages())
+    {
+      count += answer.header.stamp < last ? 1 : 0;
+      last = answer.header.stamp;
+    }
+    return count;
+  }
+
+  static std::unique_ptr<TemporaryDirectory> directory_;
+  static std::string bag_;
+  static std::map<ros::Time, Eigen::Matrix3d> truth_;
+};
+
+std::unique_ptr<TemporaryDirectory> BagReplayTest::directory_;
+std::string BagReplayTest::bag_;
+std::map<ros::Time, Eigen::Matrix3d> BagReplayTest::truth_;
+
+TEST_F(BagReplayTest, AnswersAgreeWithTheTruth)
+{
+  setViews();
+  const Recorder<PointMatches> points("point_matches");
+  const Recorder<LineMatches> lines("line_matches");
+  const Process bag(player({}));
+  EXPECT_TRUE(waitUntil([&] { return points.messages().size() >= 5 && lines.messages().size() >= 5; }));
+  EXPECT_EQ(restarts(points) + restarts(lines), 0);
+  expectTrue(points);
+  expectTrue(lines);
+}
+
+TEST_F(BagReplayTest, GoesOnWhenTheBagLoops)
+{
+  setViews();
+  const Recorder<PointMatches> points("point_matches");
+  const Recorder<LineMatches> lines("line_matches");
+  const Process bag(player({ "--loop" }));
+  EXPECT_TRUE(waitUntil([&] { return restarts(points) >= 2 && restarts(lines) >= 2; }))
+      << restarts(points) << " and " << restarts(lines) << " restarts";
+  expectTrue(points);
+  expectTrue(lines);
+}
+
+TEST_F(BagReplayTest, NodesMayStartLate)
+{
+  const Process bag(player({ "--loop" }));
+  const Recorder<LineMatches> early("line_matches");
+  ASSERT_TRUE(waitUntil([&] { return early.last().has_value(); })) << "the bag does not play";
+
+  const auto node = [](const std::string& program, const std::string& name, const std::string& topic) {
+    return std::vector<std::string>{ program,
+                                     "__name:=late_" + name,
+                                     "_view:=first",
+                                     "_rate:=50.0",
+                                     "_views_dir:=" + viewsDir(name).string(),
+                                     "image_raw:=camera/image_raw",
+                                     "camera_info:=camera/camera_info",
+                                     topic + ":=late_" + topic };
+  };
+  const Process point_matcher(node(POINT_MATCHER_PATH, "point_matcher", "point_matches"));
+  const Process line_matcher(node(LINE_MATCHER_PATH, "line_matcher", "line_matches"));
+  const Recorder<PointMatches> points("late_point_matches");
+  const Recorder<LineMatches> lines("late_line_matches");
+  EXPECT_TRUE(waitUntil([&] { return points.messages().size() >= 3 && lines.messages().size() >= 3; }));
+  expectTrue(points);
+  expectTrue(lines);
+}
+
+}  // namespace
+}  // namespace test
+}  // namespace view_servo
+
+int main(int argc, char** argv)
+{
+  return view_servo::test::runTests(argc, argv, "bag_replay_test");
+}

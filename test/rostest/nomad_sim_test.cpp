@@ -1,0 +1,220 @@
+// Copyright (c) 2026, the view_servo authors
+// SPDX-License-Identifier: BSD-3-Clause
+#include "node_test.h"
+#include "ros/robot_messages.h"
+#include "view_servo/SetLight.h"
+#include "view_servo/SetPose.h"
+
+#include <geometry_msgs/PoseStamped.h>
+#include <geometry_msgs/Twist.h>
+#include <nav_msgs/Odometry.h>
+#include <tf2_ros/buffer.h>
+#include <tf2_ros/transform_listener.h>
+
+#include <cmath>
+#include <cstdlib>
+#include <limits>
+#include <string>
+
+namespace view_servo::sim
+{
+namespace
+{
+using test::waitUntil;
+
+Eigen::Isometry3d toIsometry(const geometry_msgs::Transform& transform)
+{
+  geometry_msgs::Pose pose;
+  pose.position.x = transform.translation.x;
+  pose.position.y = transform.translation.y;
+  pose.position.z = transform.translation.z;
+  pose.orientation = transform.rotation;
+  return sim::toIsometry(pose);
+}
+
+class NomadSim : public testing::Test
+{
+protected:
+  NomadSim()
+    : odometry_("odom"),
+      truth_("ground_truth"),
+      images_("camera/image_raw"),
+      listener_(tf_),
+      command_(nh_.advertise<geometry_msgs::Twist>("cmd_vel", 1))
+  {
+  }
+
+  void SetUp() override
+  {
+    ASSERT_TRUE(waitUntil([&] { return images_.last() && truth_.last() && odometry_.last(); }));
+    ASSERT_TRUE(waitUntil([&] { return command_.getNumSubscribers() > 0; }));
+    SetPose place;
+    place.request.pose = toPose(planarPose(-0.906, 0.423, 0.0));
+    ASSERT_TRUE(ros::service::call("nomad_sim/set_pose", place) && place.response.success) << place.response.message;
+    ASSERT_TRUE(waitUntil([&] { return speed() == 0.0; }));
+    waitForFreshTruth();
+  }
+
+  double speed() const
+  {
+    const geometry_msgs::Twist twist = odometry_.last()->twist.twist;
+    return std::hypot(twist.linear.x, twist.linear.y) + std::abs(twist.angular.z);
+  }
+
+  void waitForFreshTruth()
+  {
+    const ros::Time now = ros::Time::now();
+    ASSERT_TRUE(waitUntil([&] { return truth_.last()->header.stamp > now && odometry_.last()->header.stamp > now; }));
+  }
+
+  void drive(double x, double y, double turn)
+  {
+    geometry_msgs::Twist twist;
+    twist.linear.x = x;
+    twist.linear.y = y;
+    twist.angular.z = turn;
+    command_.publish(twist);
+  }
+
+  /** Drives until that much time has passed on the robot's stamps. */
+  void driveFor(double duration, double x, double y, double turn)
+  {
+    const ros::Time end = ros::Time::now() + ros::Duration(duration);
+    ASSERT_TRUE(waitUntil([&] { return odometry_.last()->header.stamp > end; }, [&] { drive(x, y, turn); }));
+  }
+
+  /** The camera's pose in `odom`, by tf. */
+  Eigen::Isometry3d cameraByTf(const ros::Time& stamp)
+  {
+    return toIsometry(tf_.lookupTransform(ODOM_FRAME, CAMERA_FRAME, stamp, ros::Duration(2.0)).transform);
+  }
+
+  Eigen::Isometry3d cameraByTruth() const
+  {
+    return sim::toIsometry(truth_.last()->pose);
+  }
+
+  ros::NodeHandle nh_;
+  test::Recorder<nav_msgs::Odometry> odometry_;
+  test::Recorder<geometry_msgs::PoseStamped> truth_;
+  test::Recorder<sensor_msgs::Image> images_;
+  tf2_ros::Buffer tf_;
+  tf2_ros::TransformListener listener_;
+  ros::Publisher command_;
+};
+
+}  // namespace
+
+TEST_F(NomadSim, OdometryTfAndGroundTruthTellOfOneMotion)
+{
+  const geometry_msgs::PoseStamped start = *truth_.last();
+  const Eigen::Isometry3d tf_start = cameraByTf(start.header.stamp);
+  driveFor(1.5, 0.2, -0.1, 0.15);
+  waitForFreshTruth();
+  const geometry_msgs::PoseStamped end = *truth_.last();
+  const Eigen::Isometry3d true_motion = sim::toIsometry(start.pose).inverse() * sim::toIsometry(end.pose);
+  const Eigen::Isometry3d tf_motion = tf_start.inverse() * cameraByTf(end.header.stamp);
+  EXPECT_GT(true_motion.translation().norm(), 0.2);
+  EXPECT_LT((true_motion.translation() - tf_motion.translation()).norm(), 0.005);
+  EXPECT_LT(Eigen::AngleAxisd(true_motion.linear().transpose() * tf_motion.linear()).angle(), 0.003);
+  // Forward is along the optical axis, left is against the image's u axis; a turn to the left moves things to the right.
+  EXPECT_GT(true_motion.translation().z(), 0.15);
+  EXPECT_GT(true_motion.translation().x(), 0.05);
+  EXPECT_NEAR(true_motion.translation().y(), 0.0, 1e-9);
+  const Eigen::Vector3d ahead = true_motion.inverse() * Eigen::Vector3d(0.0, 0.0, 10.0);
+  EXPECT_GT(ahead.x(), 0.3);
+
+  const nav_msgs::Odometry odometry = *odometry_.last();
+  EXPECT_EQ(odometry.header.frame_id, "odom");
+  EXPECT_EQ(odometry.child_frame_id, "base_link");
+  EXPECT_EQ(end.header.frame_id, "world");
+  EXPECT_EQ(images_.last()->header.frame_id, "camera_optical_frame");
+}
+
+TEST_F(NomadSim, StandsAQuarterOfASecondAfterTheLastCommand)
+{
+  driveFor(0.8, 0.4, 0.0, 0.0);
+  EXPECT_GT(speed(), 0.3);
+  drive(0.4, 0.0, 0.0);
+  const ros::WallTime last = ros::WallTime::now();
+  ASSERT_TRUE(waitUntil([&] { return speed() == 0.0; }));
+  // Its own stamp says when it stood, however late the message came.
+  for (const nav_msgs::Odometry& message : odometry_.messages())
+  {
+    const double after = message.header.stamp.toSec() - last.toSec();
+    if (after > 0.25)
+    {
+      EXPECT_EQ(message.twist.twist.linear.x, 0.0) << after << " s after the last command";
+    }
+  }
+}
+
+TEST_F(NomadSim, RefusesCommandsThatAreNotFinite)
+{
+  const Eigen::Isometry3d before = cameraByTruth();
+  driveFor(0.5, std::numeric_limits<double>::quiet_NaN(), 0.1, 0.0);
+  waitForFreshTruth();
+  EXPECT_TRUE(cameraByTruth().isApprox(before, 1e-9));
+  driveFor(0.5, 0.1, 0.0, 0.0);
+  waitForFreshTruth();
+  EXPECT_GT((cameraByTruth().translation() - before.translation()).norm(), 0.01);
+}
+
+TEST_F(NomadSim, RefusesPosesInsideFurniture)
+{
+  const Eigen::Isometry3d before = cameraByTruth();
+  SetPose place;
+  place.request.pose = toPose(planarPose(2.2, 0.0, 0.0));
+  ASSERT_TRUE(ros::service::call("nomad_sim/set_pose", place));
+  EXPECT_FALSE(place.response.success);
+  EXPECT_NE(place.response.message.find("table"), std::string::npos) << place.response.message;
+  place.request.pose.orientation.w = 0.0;
+  ASSERT_TRUE(ros::service::call("nomad_sim/set_pose", place));
+  EXPECT_FALSE(place.response.success);
+  place.request.pose = toPose(planarPose(std::numeric_limits<double>::infinity(), 0.0, 0.0));
+  ASSERT_TRUE(ros::service::call("nomad_sim/set_pose", place));
+  EXPECT_FALSE(place.response.success);
+  waitForFreshTruth();
+  EXPECT_TRUE(cameraByTruth().isApprox(before, 1e-12));
+}
+
+TEST_F(NomadSim, LightIsSet)
+{
+  const auto mean = [&] {
+    return cv::mean(toGrey(*images_.last(), "image"))[0];
+  };
+  const double before = mean();
+  SetLight light;
+  light.request.gain = 0.6;
+  light.request.offset = 5.0;
+  ASSERT_TRUE(ros::service::call("nomad_sim/set_light", light) && light.response.success) << light.response.message;
+  EXPECT_TRUE(waitUntil([&] { return std::abs(mean() - (0.6 * before + 5.0)) < 1.0; })) << before << " " << mean();
+  for (const double gain : { 0.0, -1.0, std::numeric_limits<double>::quiet_NaN() })
+  {
+    light.request.gain = gain;
+    ASSERT_TRUE(ros::service::call("nomad_sim/set_light", light));
+    EXPECT_FALSE(light.response.success);
+  }
+  light.request.gain = 1.0;
+  light.request.offset = 0.0;
+  ASSERT_TRUE(ros::service::call("nomad_sim/set_light", light) && light.response.success);
+  EXPECT_TRUE(waitUntil([&] { return std::abs(mean() - before) < 1.0; }));
+}
+
+TEST_F(NomadSim, NodesRefuseBadWorlds)
+{
+  const std::string node = NOMAD_SIM_PATH;
+  for (const std::string arguments : { " _world:=nowhere", " _world:=desk _start:=nowhere", " _groups:=nothing",
+                                       " _world:=desk _max_speed:=-1.0", " _seed:=-1" })
+  {
+    const int status = std::system((node + " __name:=refused" + arguments + " 2> /dev/null").c_str());
+    EXPECT_EQ(WEXITSTATUS(status), 1) << arguments;
+  }
+}
+
+}  // namespace view_servo::sim
+
+int main(int argc, char** argv)
+{
+  return view_servo::test::runTests(argc, argv, "nomad_sim_test");
+}

@@ -1,0 +1,201 @@
+// Copyright (c) 2026, the view_servo authors
+// SPDX-License-Identifier: BSD-3-Clause
+#include "node_test.h"
+#include "ros/robot_messages.h"
+#include "view_servo/SetPose.h"
+
+#include <geometry_msgs/PoseStamped.h>
+#include <geometry_msgs/TwistStamped.h>
+#include <sensor_msgs/JointState.h>
+#include <tf2_ros/buffer.h>
+#include <tf2_ros/transform_listener.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstdlib>
+#include <limits>
+#include <string>
+
+namespace view_servo::sim
+{
+namespace
+{
+using test::waitUntil;
+
+class PumaSim : public testing::Test
+{
+protected:
+  PumaSim()
+    : joints_("joint_states"),
+      truth_("ground_truth"),
+      images_("camera/image_raw"),
+      listener_(tf_),
+      command_(nh_.advertise<geometry_msgs::TwistStamped>("cmd_vel", 1))
+  {
+  }
+
+  void SetUp() override
+  {
+    ASSERT_TRUE(waitUntil([&] { return images_.last() && truth_.last() && joints_.last(); }));
+    ASSERT_TRUE(waitUntil([&] { return command_.getNumSubscribers() > 0; }));
+    ASSERT_TRUE(waitUntil([&] { return tf_.canTransform(BASE_FRAME, CAMERA_FRAME, ros::Time(0)); }));
+    ASSERT_TRUE(waitUntil([&] { return speed() == 0.0; }));
+    waitForFreshTruth();
+  }
+
+  double speed() const
+  {
+    double sum = 0.0;
+    const sensor_msgs::JointState joints = *joints_.last();
+    for (const double velocity : joints.velocity)
+    {
+      sum += std::abs(velocity);
+    }
+    return sum;
+  }
+
+  void waitForFreshTruth()
+  {
+    const ros::Time now = ros::Time::now();
+    ASSERT_TRUE(waitUntil([&] { return truth_.last()->header.stamp > now && joints_.last()->header.stamp > now; }));
+  }
+
+  void move(const Puma::Twist& twist, const std::string& frame = CAMERA_FRAME)
+  {
+    geometry_msgs::TwistStamped message;
+    message.header.stamp = ros::Time::now();
+    message.header.frame_id = frame;
+    message.twist.linear.x = twist(0);
+    message.twist.linear.y = twist(1);
+    message.twist.linear.z = twist(2);
+    message.twist.angular.x = twist(3);
+    message.twist.angular.y = twist(4);
+    message.twist.angular.z = twist(5);
+    command_.publish(message);
+  }
+
+  void moveFor(double duration, const Puma::Twist& twist, const std::string& frame = CAMERA_FRAME)
+  {
+    const ros::Time end = ros::Time::now() + ros::Duration(duration);
+    ASSERT_TRUE(waitUntil([&] { return joints_.last()->header.stamp > end; }, [&] { move(twist, frame); }));
+  }
+
+  Eigen::Isometry3d cameraByTf(const ros::Time& stamp)
+  {
+    const geometry_msgs::Transform transform =
+        tf_.lookupTransform(BASE_FRAME, CAMERA_FRAME, stamp, ros::Duration(2.0)).transform;
+    geometry_msgs::Pose pose;
+    pose.position.x = transform.translation.x;
+    pose.position.y = transform.translation.y;
+    pose.position.z = transform.translation.z;
+    pose.orientation = transform.rotation;
+    return toIsometry(pose);
+  }
+
+  Eigen::Isometry3d cameraByTruth() const
+  {
+    return toIsometry(truth_.last()->pose);
+  }
+
+  ros::NodeHandle nh_;
+  test::Recorder<sensor_msgs::JointState> joints_;
+  test::Recorder<geometry_msgs::PoseStamped> truth_;
+  test::Recorder<sensor_msgs::Image> images_;
+  tf2_ros::Buffer tf_;
+  tf2_ros::TransformListener listener_;
+  ros::Publisher command_;
+};
+
+Puma::Twist twist(double x, double y, double z, double wx, double wy, double wz)
+{
+  Puma::Twist result;
+  result << x, y, z, wx, wy, wz;
+  return result;
+}
+
+}  // namespace
+
+TEST_F(PumaSim, TfAndGroundTruthTellOfOneMotion)
+{
+  const geometry_msgs::PoseStamped start = *truth_.last();
+  const Eigen::Isometry3d tf_start = cameraByTf(start.header.stamp);
+  moveFor(1.0, twist(0.02, -0.03, -0.04, 0.03, -0.02, 0.1));
+  waitForFreshTruth();
+  const geometry_msgs::PoseStamped end = *truth_.last();
+  const Eigen::Isometry3d true_motion = toIsometry(start.pose).inverse() * toIsometry(end.pose);
+  const Eigen::Isometry3d tf_motion = tf_start.inverse() * cameraByTf(end.header.stamp);
+  EXPECT_LT((true_motion.translation() - tf_motion.translation()).norm(), 0.002);
+  EXPECT_LT(Eigen::AngleAxisd(true_motion.linear().transpose() * tf_motion.linear()).angle(), 0.005);
+  // As commanded, in the optical frame.
+  EXPECT_GT(true_motion.translation().x(), 0.01);
+  EXPECT_LT(true_motion.translation().y(), -0.015);
+  EXPECT_LT(true_motion.translation().z(), -0.02);
+  const Eigen::AngleAxisd turn(true_motion.linear());
+  EXPECT_GT(turn.angle() * turn.axis().z(), 0.05);
+  EXPECT_EQ(images_.last()->header.frame_id, "camera_optical_frame");
+  EXPECT_EQ(joints_.last()->name.size(), 6U);
+}
+
+TEST_F(PumaSim, StandsAQuarterOfASecondAfterTheLastCommand)
+{
+  moveFor(0.6, twist(0.0, 0.0, -0.05, 0.0, 0.0, 0.2));
+  EXPECT_GT(speed(), 0.05);
+  move(twist(0.0, 0.0, -0.05, 0.0, 0.0, 0.2));
+  const ros::WallTime last = ros::WallTime::now();
+  ASSERT_TRUE(waitUntil([&] { return speed() == 0.0; }));
+  for (const sensor_msgs::JointState& message : joints_.messages())
+  {
+    const double after = message.header.stamp.toSec() - last.toSec();
+    if (after > 0.25)
+    {
+      EXPECT_TRUE(std::all_of(message.velocity.begin(), message.velocity.end(), [](double v) { return v == 0.0; }))
+          << after << " s after the last command";
+    }
+  }
+}
+
+TEST_F(PumaSim, RefusesCommandsThatAreNotFiniteOrInAnotherFrame)
+{
+  const Eigen::Isometry3d before = cameraByTruth();
+  moveFor(0.4, twist(std::numeric_limits<double>::quiet_NaN(), 0.0, 0.0, 0.0, 0.0, 0.1));
+  moveFor(0.4, twist(0.0, 0.0, -0.05, 0.0, 0.0, 0.0), "base_link");
+  waitForFreshTruth();
+  EXPECT_TRUE(cameraByTruth().isApprox(before, 1e-9));
+}
+
+TEST_F(PumaSim, GoesToPosesWithinReachOnly)
+{
+  const Eigen::Isometry3d before = cameraByTruth();
+  Eigen::Isometry3d near = before;
+  near.translation().z() += 0.02;
+  SetPose place;
+  place.request.pose = toPose(near);
+  ASSERT_TRUE(ros::service::call("puma_sim/set_pose", place) && place.response.success) << place.response.message;
+  waitForFreshTruth();
+  EXPECT_TRUE(cameraByTruth().isApprox(near, 1e-5));
+  Eigen::Isometry3d far = before;
+  far.translation().x() += 5.0;
+  place.request.pose = toPose(far);
+  ASSERT_TRUE(ros::service::call("puma_sim/set_pose", place));
+  EXPECT_FALSE(place.response.success);
+  waitForFreshTruth();
+  EXPECT_TRUE(cameraByTruth().isApprox(near, 1e-5));
+}
+
+TEST_F(PumaSim, NodesRefuseBadParameters)
+{
+  const std::string node = PUMA_SIM_PATH;
+  for (const std::string arguments :
+       { " _world:=desk", " _world:=rice _start:=nowhere", " _world:=rice _encoder_noise:=-1.0" })
+  {
+    const int status = std::system((node + " __name:=refused" + arguments + " 2> /dev/null").c_str());
+    EXPECT_EQ(WEXITSTATUS(status), 1) << arguments;
+  }
+}
+
+}  // namespace view_servo::sim
+
+int main(int argc, char** argv)
+{
+  return view_servo::test::runTests(argc, argv, "puma_sim_test");
+}

@@ -1,0 +1,626 @@
+// Copyright (c) 2026, the view_servo authors
+// SPDX-License-Identifier: BSD-3-Clause
+// Runs the program itself, as a shell would, and reads what it wrote.
+#include "ros/robot_messages.h"
+#include "sim/puma.h"
+#include "sim/world.h"
+#include "support/temporary_directory.h"
+#include "view_servo/ros/conversions.h"
+
+#include <gtest/gtest.h>
+#include <rosbag/bag.h>
+#include <rosbag/view.h>
+#include <sensor_msgs/Image.h>
+#include <sensor_msgs/image_encodings.h>
+#include <tf2_msgs/TFMessage.h>
+#include <opencv2/core.hpp>
+#include <opencv2/imgcodecs.hpp>
+
+#include <sys/wait.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstdlib>
+#include <filesystem>
+#include <fstream>
+#include <iterator>
+#include <map>
+#include <string>
+#include <vector>
+
+namespace view_servo
+{
+namespace test
+{
+namespace
+{
+using nav_msgs::Odometry;
+using sensor_msgs::CameraInfo;
+using sensor_msgs::Image;
+using sensor_msgs::JointState;
+using tf2_msgs::TFMessage;
+using Truth = geometry_msgs::PoseStamped;
+
+const std::string IMAGES = "/camera/image_raw";
+const std::string CAMERA_INFOS = "/camera/camera_info";
+const std::string TRUTH = "/ground_truth";
+const std::string ODOMETRY = "/odom";
+const std::string JOINT_STATES = "/joint_states";
+const std::string TF = "/tf";
+const std::string TF_STATIC = "/tf_static";
+
+constexpr double DEGREE = M_PI / 180.0;
+
+/** Ends of the camera's entry are left open for each test. */
+const std::string NOMAD_WORLD = R"(
+robot: {kind: nomad, camera_height: 0.8}
+camera: {width: 160, height: 120, fx: 130, fy: 132, cx: 81, cy: 58, noise: 2CAMERA}
+textures:
+  wall: {kind: blotches, size: [256, 128], seed: 3}
+  poster: {kind: poster, size: [128, 128], seed: 4, count: 3}
+rectangles:
+  - {name: wall, size: [8, 3], position: [3, 0, 1], facing: [-1, 0, 0], texture: wall}
+  - {name: poster, group: extra, size: [1, 1], position: [2.9, 0, 1], facing: [-1, 0, 0], texture: poster}
+boxes:
+  - {name: the pillar, size: [0.3, 0.3, 2], position: [1.5, 1.2, 0], texture: wall}
+goal: {x: 0, y: 0}
+trajectories:
+  way:
+    - {time: 5, x: -0.5, y: 0.2}
+    - {time: 6, x: -0.3, y: 0.1, yaw_deg: 10}
+    - {time: 7, x: -0.1, y: 0.1, yaw_deg: -10}
+  crash:
+    - {time: 0, x: 0.5, y: 1.2}
+    - {time: 4, x: 1.5, y: 1.2}
+  inside:
+    - {time: 0, x: 1.5, y: 1.2}
+  long:
+    - {time: 0, x: 0, y: 0}
+    - {time: 3601, x: 0, y: 0}
+)";
+
+const std::string PUMA_WORLD = R"(
+robot: {kind: puma, position: [0.2, 0.1, 0.05], yaw_deg: 30}
+camera: {width: 160, height: 120, fx: 130}
+textures:
+  table: {kind: poster, size: [256, 256], seed: 5}
+rectangles:
+  - {name: table, size: [2, 2], position: [0.6, 0, 0], facing: [0, 0, 1], texture: table}
+goal: {position: [0.7, 0.3, 0.8], look_at: [0.8, 0.35, 0]}
+trajectories:
+  way:
+    - {time: 0, position: [0.75, 0.25, 0.75], look_at: [0.85, 0.35, 0]}
+    - {time: 1, position: [0.7, 0.3, 0.8], look_at: [0.8, 0.35, 0], roll_deg: 8}
+    - {time: 2, position: [0.7, 0.35, 0.8], look_at: [0.8, 0.35, 0]}
+  far:
+    - {time: 0, position: [3, 0, 1], look_at: [4, 0, 0]}
+)";
+
+struct Outcome
+{
+  int status;
+  std::string out;
+  std::string err;
+};
+
+template <typename Message>
+std::vector<Message> messagesOf(const std::string& file, const std::string& topic)
+{
+  const rosbag::Bag bag(file);
+  std::vector<Message> messages;
+  for (const rosbag::MessageInstance& instance : rosbag::View(bag, rosbag::TopicQuery(topic)))
+  {
+    const auto message = instance.instantiate<Message>();
+    EXPECT_TRUE(message) << topic << " holds " << instance.getDataType();
+    messages.push_back(*message);
+  }
+  return messages;
+}
+
+/** Messages a topic has; their stamps in the bag must increase. */
+std::map<std::string, int> topicsOf(const std::string& file)
+{
+  const rosbag::Bag bag(file);
+  std::map<std::string, int> counts;
+  std::map<std::string, ros::Time> last;
+  for (const rosbag::MessageInstance& instance : rosbag::View(bag))
+  {
+    const std::string topic = instance.getTopic();
+    EXPECT_GT(instance.getTime(), last[topic]) << topic;
+    last[topic] = instance.getTime();
+    ++counts[topic];
+  }
+  return counts;
+}
+
+Eigen::Isometry3d poseOf(const geometry_msgs::TransformStamped& transform)
+{
+  geometry_msgs::Pose pose;
+  pose.position.x = transform.transform.translation.x;
+  pose.position.y = transform.transform.translation.y;
+  pose.position.z = transform.transform.translation.z;
+  pose.orientation = transform.transform.rotation;
+  return sim::toIsometry(pose);
+}
+
+/** Expects 1 mm and 0.1 degrees at most between two poses. */
+void expectNear(const Eigen::Isometry3d& a, const Eigen::Isometry3d& b, const ros::Time& when)
+{
+  EXPECT_LT((a.translation() - b.translation()).norm(), 1e-3) << when;
+  EXPECT_LT(Eigen::AngleAxisd(a.linear().transpose() * b.linear()).angle(), 0.1 * DEGREE) << when;
+}
+
+/** Mean difference of neighbouring grey levels: less in a blurred image. */
+double sharpness(const Image& image)
+{
+  const cv::Mat grey = toGrey(image, "image");
+  return cv::norm(grey.colRange(1, grey.cols), grey.colRange(0, grey.cols - 1), cv::NORM_L1) /
+         static_cast<double>(grey.total());
+}
+
+class RecordBag : public ::testing::Test
+{
+protected:
+  RecordBag()
+  {
+    nomad_ = writeNomadWorld("nomad.yaml", "");
+    puma_ = writeText("puma.yaml", PUMA_WORLD);
+    out_ = path("out.bag");
+  }
+
+  std::string path(const std::string& name) const
+  {
+    return directory_.path() / name;
+  }
+
+  std::string writeText(const std::string& name, const std::string& text) const
+  {
+    std::ofstream(path(name), std::ios::binary) << text;
+    return path(name);
+  }
+
+  /** @param camera more keys of the camera's entry. */
+  std::string writeNomadWorld(const std::string& name, const std::string& camera) const
+  {
+    std::string text = NOMAD_WORLD;
+    const std::string mark = "CAMERA";
+    return writeText(name, text.replace(text.find(mark), mark.size(), camera));
+  }
+
+  static std::string textOf(const std::string& file)
+  {
+    std::ifstream stream(file, std::ios::binary);
+    return { std::istreambuf_iterator<char>(stream), {} };
+  }
+
+  /** @param before commands that the shell carries out first. */
+  Outcome run(const std::vector<std::string>& arguments, const std::string& before = ":") const
+  {
+    std::string command = before + "; ROS_PACKAGE_PATH='" PACKAGE_DIR "' '" RECORD_BAG_BINARY "'";
+    for (const std::string& argument : arguments)
+    {
+      command += " '" + argument + "'";
+    }
+    command += " > '" + path("stdout") + "' 2> '" + path("stderr") + "' < /dev/null";
+    const int status = std::system(command.c_str());
+    return { WIFEXITED(status) ? WEXITSTATUS(status) : -1, textOf(path("stdout")), textOf(path("stderr")) };
+  }
+
+  /** Records what should go well. @return the bag's file. */
+  std::string record(const std::string& world, const std::vector<std::string>& more = {},
+                     const std::string& name = "out.bag") const
+  {
+    std::vector<std::string> arguments{ world, "way", path(name) };
+    arguments.insert(arguments.end(), more.begin(), more.end());
+    const Outcome outcome = run(arguments);
+    EXPECT_EQ(outcome.status, 0);
+    EXPECT_EQ(outcome.out + outcome.err, "");
+    return path(name);
+  }
+
+  /** Status 2, one line that names `culprit`, and no file. */
+  void expectBadInput(const std::vector<std::string>& arguments, const std::string& culprit,
+                      const std::string& before = ":") const
+  {
+    const Outcome outcome = run(arguments, before);
+    EXPECT_EQ(outcome.status, 2) << culprit;
+    EXPECT_EQ(outcome.out, "");
+    EXPECT_EQ(std::count(outcome.err.begin(), outcome.err.end(), '\n'), 1) << outcome.err;
+    EXPECT_NE(outcome.err.find(culprit), std::string::npos) << outcome.err << " does not name " << culprit;
+    for (const auto& entry : std::filesystem::directory_iterator(directory_.path()))
+    {
+      EXPECT_EQ(entry.path().string().find(out_), std::string::npos) << entry.path() << " is left";
+    }
+  }
+
+  std::string nomad_;
+  std::string puma_;
+  std::string out_;
+
+private:
+  TemporaryDirectory directory_;
+};
+
+TEST_F(RecordBag, HasTheTopicsOfANomad)
+{
+  const std::string bag = record(nomad_);
+  // 2 s, both ends included.
+  const std::map<std::string, int> expected{ { CAMERA_INFOS, 9 }, { IMAGES, 9 }, { ODOMETRY, 41 },
+                                             { TF, 41 },          { TRUTH, 41 }, { TF_STATIC, 1 } };
+  EXPECT_EQ(topicsOf(bag), expected);
+
+  const std::vector<Image> images = messagesOf<Image>(bag, IMAGES);
+  const std::vector<CameraInfo> infos = messagesOf<CameraInfo>(bag, CAMERA_INFOS);
+  std::map<ros::Time, int> truths;
+  for (const Truth& truth : messagesOf<Truth>(bag, TRUTH))
+  {
+    ++truths[truth.header.stamp];
+    EXPECT_EQ(truth.header.frame_id, "world");
+  }
+  for (std::size_t i = 0; i < images.size(); ++i)
+  {
+    EXPECT_EQ(images[i].header.stamp, ros::Time(1000.0 + 0.25 * static_cast<double>(i)));
+    EXPECT_EQ(infos[i].header.stamp, images[i].header.stamp);
+    EXPECT_EQ(truths.count(images[i].header.stamp), 1U);
+    EXPECT_EQ(images[i].header.frame_id, "camera_optical_frame");
+    EXPECT_EQ(infos[i].header.frame_id, "camera_optical_frame");
+    EXPECT_EQ(images[i].encoding, sensor_msgs::image_encodings::MONO8);
+    EXPECT_EQ(images[i].width, 160U);
+    EXPECT_EQ(images[i].height, 120U);
+  }
+  for (const Odometry& odometry : messagesOf<Odometry>(bag, ODOMETRY))
+  {
+    EXPECT_EQ(odometry.header.frame_id, "odom");
+    EXPECT_EQ(odometry.child_frame_id, "base_link");
+    EXPECT_EQ(truths.count(odometry.header.stamp), 1U);
+  }
+}
+
+TEST_F(RecordBag, KeepsTheStaticTransformForThoseWhoComeLater)
+{
+  const std::string file = record(nomad_);
+  const rosbag::Bag bag(file);
+  for (const rosbag::MessageInstance& instance : rosbag::View(bag))
+  {
+    const bool latched = (*instance.getConnectionHeader())["latching"] == "1";
+    EXPECT_EQ(latched, instance.getTopic() == TF_STATIC) << instance.getTopic();
+  }
+}
+
+TEST_F(RecordBag, FollowsTheTrajectory)
+{
+  const sim::World world = sim::readWorld(nomad_);
+  for (const Truth& truth : messagesOf<Truth>(record(nomad_), TRUTH))
+  {
+    const double time = 5.0 + (truth.header.stamp - ros::Time(1000.0)).toSec();
+    const Eigen::Isometry3d wanted = sim::poseAt(world.trajectory("way"), time) * world.camera_on_base;
+    const Eigen::Isometry3d pose = sim::toIsometry(truth.pose);
+    EXPECT_LT((pose.translation() - wanted.translation()).norm(), 0.04) << time;
+    EXPECT_LT(Eigen::AngleAxisd(pose.linear().transpose() * wanted.linear()).angle(), 4.0 * DEGREE) << time;
+  }
+}
+
+TEST_F(RecordBag, IsTheSameForTheSameSeed)
+{
+  const std::vector<std::string> noise{ "--odometry-noise", "0.1" };
+  const std::string first = textOf(record(nomad_, noise, "a.bag"));
+  EXPECT_GT(first.size(), 1000U);
+  EXPECT_EQ(first, textOf(record(nomad_, noise, "b.bag")));
+
+  const std::string other = record(nomad_, { "--odometry-noise", "0.1", "--seed", "2" }, "c.bag");
+  EXPECT_NE(messagesOf<Image>(path("a.bag"), IMAGES).back().data, messagesOf<Image>(other, IMAGES).back().data);
+  EXPECT_NE(messagesOf<Odometry>(path("a.bag"), ODOMETRY).back().pose.pose.position.x,
+            messagesOf<Odometry>(other, ODOMETRY).back().pose.pose.position.x);
+
+  const std::string arm = textOf(record(puma_, { "--encoder-noise", "0.001" }, "d.bag"));
+  EXPECT_EQ(arm, textOf(record(puma_, { "--encoder-noise", "0.001" }, "e.bag")));
+  EXPECT_NE(arm, textOf(record(puma_, { "--encoder-noise", "0.001", "--seed", "7" }, "f.bag")));
+}
+
+TEST_F(RecordBag, HasTheWorldsCalibration)
+{
+  for (const CameraInfo& info : messagesOf<CameraInfo>(record(nomad_), CAMERA_INFOS))
+  {
+    const Camera camera = toCamera(info);
+    EXPECT_EQ(camera.width, 160);
+    EXPECT_EQ(camera.height, 120);
+    EXPECT_EQ(camera.k, sim::readWorld(nomad_).camera.k);
+    EXPECT_EQ(camera.projection.leftCols<3>(), camera.k);
+    EXPECT_EQ(camera.distortion_model, "plumb_bob");
+  }
+  for (const CameraInfo& info : messagesOf<CameraInfo>(record(nomad_, { "--focal-length-error", "0.1" }), CAMERA_INFOS))
+  {
+    EXPECT_NEAR(info.K[0], 143.0, 1e-9);
+    EXPECT_NEAR(info.P[5], 145.2, 1e-9);
+    EXPECT_EQ(info.K[2], 81.0);
+  }
+}
+
+TEST_F(RecordBag, OdometryAgreesWithTheTruth)
+{
+  const std::string bag = record(nomad_);
+  const Eigen::Isometry3d camera_on_base = poseOf(messagesOf<TFMessage>(bag, TF_STATIC).at(0).transforms.at(0));
+  std::map<ros::Time, Eigen::Isometry3d> cameras;  // in odom
+  for (const TFMessage& message : messagesOf<TFMessage>(bag, TF))
+  {
+    const geometry_msgs::TransformStamped& transform = message.transforms.at(0);
+    EXPECT_EQ(transform.header.frame_id, "odom");
+    EXPECT_EQ(transform.child_frame_id, "base_link");
+    cameras[transform.header.stamp] = poseOf(transform) * camera_on_base;
+  }
+  for (const Odometry& odometry : messagesOf<Odometry>(bag, ODOMETRY))
+  {
+    expectNear(sim::toIsometry(odometry.pose.pose) * camera_on_base, cameras.at(odometry.header.stamp),
+               odometry.header.stamp);
+  }
+  const std::vector<Truth> truths = messagesOf<Truth>(bag, TRUTH);
+  const Eigen::Isometry3d first = sim::toIsometry(truths.front().pose);
+  for (std::size_t i = 1; i < truths.size(); ++i)
+  {
+    const ros::Time& stamp = truths[i].header.stamp;
+    const Eigen::Isometry3d before = sim::toIsometry(truths[i - 1].pose);
+    const Eigen::Isometry3d now = sim::toIsometry(truths[i].pose);
+    expectNear(before.inverse() * now, cameras.at(truths[i - 1].header.stamp).inverse() * cameras.at(stamp), stamp);
+    expectNear(first.inverse() * now, cameras.at(truths.front().header.stamp).inverse() * cameras.at(stamp), stamp);
+  }
+}
+
+TEST_F(RecordBag, OdometryDriftsWhenToldSo)
+{
+  const auto distance = [&](const std::string& bag) {
+    const auto at = messagesOf<Odometry>(bag, ODOMETRY).back().pose.pose.position;
+    return std::hypot(at.x, at.y);
+  };
+  const double truth = distance(record(nomad_));
+  EXPECT_NEAR(distance(record(nomad_, { "--odometry-drift", "0.2" })), 1.2 * truth, 0.01 * truth);
+}
+
+TEST_F(RecordBag, HasTheTopicsOfAPuma)
+{
+  const std::string bag = record(puma_);
+  const std::map<std::string, int> expected{
+    { CAMERA_INFOS, 9 }, { IMAGES, 9 }, { JOINT_STATES, 41 }, { TF, 41 }, { TRUTH, 41 }
+  };
+  EXPECT_EQ(topicsOf(bag), expected);
+
+  const sim::World world = sim::readWorld(puma_);
+  std::map<ros::Time, Eigen::Isometry3d> truths;
+  for (const Truth& truth : messagesOf<Truth>(bag, TRUTH))
+  {
+    const double time = (truth.header.stamp - ros::Time(1000.0)).toSec();
+    const Eigen::Isometry3d wanted = sim::poseAt(world.trajectory("way"), time);
+    truths[truth.header.stamp] = sim::toIsometry(truth.pose);
+    EXPECT_LT((truths[truth.header.stamp].translation() - wanted.translation()).norm(), 0.03) << time;
+  }
+  const sim::Puma puma(textOf(PACKAGE_DIR "/urdf/puma560.urdf"), sim::PumaParams());
+  for (const JointState& state : messagesOf<JointState>(bag, JOINT_STATES))
+  {
+    EXPECT_EQ(state.name, puma.jointNames());
+    ASSERT_EQ(state.position.size(), 6U);
+    const sim::Puma::Joints joints = Eigen::Map<const sim::Puma::Joints>(state.position.data());
+    expectNear(world.robot_base * puma.nominalCameraPose(joints), truths.at(state.header.stamp), state.header.stamp);
+  }
+  for (const TFMessage& message : messagesOf<TFMessage>(bag, TF))
+  {
+    const geometry_msgs::TransformStamped& transform = message.transforms.at(0);
+    EXPECT_EQ(transform.header.frame_id, "base_link");
+    EXPECT_EQ(transform.child_frame_id, "camera_optical_frame");
+    expectNear(world.robot_base * poseOf(transform), truths.at(transform.header.stamp), transform.header.stamp);
+  }
+}
+
+TEST_F(RecordBag, EncodersAreNoisyWhenToldSo)
+{
+  const auto exact = messagesOf<JointState>(record(puma_, {}, "a.bag"), JOINT_STATES);
+  const auto noisy = messagesOf<JointState>(record(puma_, { "--encoder-noise", "0.01" }, "b.bag"), JOINT_STATES);
+  double sum = 0.0;
+  for (std::size_t i = 0; i < exact.size(); ++i)
+  {
+    sum += std::pow(noisy.at(i).position[2] - exact[i].position[2], 2);
+  }
+  EXPECT_NEAR(std::sqrt(sum / static_cast<double>(exact.size())), 0.01, 0.005);
+}
+
+TEST_F(RecordBag, ShowsWhatTheOptionsSay)
+{
+  const auto first = [&](const std::vector<std::string>& more) {
+    std::vector<std::string> arguments{ "--image-noise", "0" };
+    arguments.insert(arguments.end(), more.begin(), more.end());
+    return toGrey(messagesOf<Image>(record(nomad_, arguments), IMAGES).front(), "image");
+  };
+  const cv::Mat plain = first({});
+  EXPECT_GT(cv::norm(plain, toGrey(messagesOf<Image>(record(nomad_), IMAGES).front(), "image"), cv::NORM_INF), 2.0);
+  EXPECT_GT(cv::norm(plain, first({ "--groups", "extra" }), cv::NORM_INF), 20.0);
+  cv::Mat dimmed;
+  plain.convertTo(dimmed, CV_8U, 0.5, 20.0);
+  EXPECT_LE(cv::norm(dimmed, first({ "--light-gain", "0.5", "--light-offset", "20" }), cv::NORM_INF), 1.0);
+}
+
+TEST_F(RecordBag, TakesRatesAndStart)
+{
+  const std::string bag =
+      record(nomad_, { "--rate", "3", "--odometry-rate", "40", "--start-time", "12.5", "--groups", "extra" });
+  const std::map<std::string, int> counts = topicsOf(bag);
+  EXPECT_EQ(counts.at(IMAGES), 7);
+  EXPECT_EQ(counts.at(ODOMETRY), 81);
+  EXPECT_EQ(counts.at(TRUTH), 81 + 4) << "at each image and each odometry";
+  EXPECT_EQ(messagesOf<Image>(bag, IMAGES).front().header.stamp, ros::Time(12.5));
+  EXPECT_EQ(messagesOf<Odometry>(bag, ODOMETRY).back().header.stamp, ros::Time(14.5));
+}
+
+TEST_F(RecordBag, BlursWhatMoves)
+{
+  const std::vector<std::string> no_noise{ "--image-noise", "0" };
+  const auto sharp = messagesOf<Image>(record(nomad_, no_noise, "a.bag"), IMAGES);
+  const auto blurred =
+      messagesOf<Image>(record(writeNomadWorld("slow.yaml", ", exposure: 0.2"), no_noise, "b.bag"), IMAGES);
+  EXPECT_NEAR(sharpness(blurred[0]), sharpness(sharp[0]), 0.01) << "it stands still";
+  EXPECT_LT(sharpness(blurred[6]), 0.9 * sharpness(sharp[6]));
+}
+
+TEST_F(RecordBag, FindsTheWorldsOfThePackage)
+{
+  const Outcome outcome = run({ "desk", "lose", out_, "--rate", "0.1", "--image-noise", "0" });
+  EXPECT_EQ(outcome.status, 0) << outcome.err;
+  const std::vector<Image> images = messagesOf<Image>(out_, IMAGES);
+  ASSERT_EQ(images.size(), 2U);
+  EXPECT_EQ(images[0].width, 640U);
+}
+
+TEST_F(RecordBag, RefusesWhatIsUnknown)
+{
+  expectBadInput({}, "WORLD TRAJECTORY OUT.bag");
+  expectBadInput({ nomad_, out_ }, "WORLD TRAJECTORY OUT.bag");
+  expectBadInput({ nomad_, "way", out_, "more" }, "WORLD TRAJECTORY OUT.bag");
+  expectBadInput({ "nowhere", "way", out_ }, "'nowhere'");
+  expectBadInput({ path("none.yaml"), "way", out_ }, path("none.yaml"));
+  expectBadInput({ writeText("bad.yaml", "robot: [1, 2"), "way", out_ }, path("bad.yaml"));
+  expectBadInput({ nomad_, "detour", out_ }, "'detour'");
+  expectBadInput({ nomad_, "way", out_, "--groups", "extra,fruit" }, "'fruit'");
+  expectBadInput({ nomad_, "way", out_, "--speed", "3" }, "--speed");
+  expectBadInput({ nomad_, "way", out_, "--seed", "-1" }, "--seed");
+  expectBadInput({ nomad_, "way", out_, "--rate" }, "--rate");
+}
+
+TEST_F(RecordBag, RefusesNumbersOutOfRange)
+{
+  for (const std::string option : { "--rate", "--odometry-rate", "--start-time", "--image-noise", "--light-gain",
+                                    "--light-offset", "--focal-length-error", "--odometry-drift", "--odometry-noise" })
+  {
+    expectBadInput({ nomad_, "way", out_, option, "nan" }, option);
+    expectBadInput({ nomad_, "way", out_, option, "-1000" }, option);
+  }
+  for (const std::string value : { "nan", "inf", "-inf", "1e999", "-0.1", "x", "1x" })
+  {
+    expectBadInput({ puma_, "way", out_, "--encoder-noise", value }, "--encoder-noise");
+  }
+  expectBadInput({ nomad_, "way", out_, "--rate", "0" }, "--rate");
+  expectBadInput({ nomad_, "way", out_, "--rate", "101" }, "--rate");
+}
+
+TEST_F(RecordBag, RefusesWhatTheRobotDoesNotHave)
+{
+  expectBadInput({ nomad_, "way", out_, "--encoder-noise", "0.1" }, "--encoder-noise");
+  expectBadInput({ puma_, "way", out_, "--odometry-noise", "0.1" }, "--odometry-noise");
+  expectBadInput({ puma_, "way", out_, "--odometry-drift", "0.1" }, "--odometry-drift");
+  expectBadInput({ puma_, "way", out_, "--urdf", path("none.urdf") }, path("none.urdf"));
+}
+
+TEST_F(RecordBag, RefusesWaysThatCannotBeFollowed)
+{
+  expectBadInput({ nomad_, "crash", out_ }, "the pillar");
+  expectBadInput({ nomad_, "inside", out_ }, "the pillar");
+  expectBadInput({ nomad_, "long", out_ }, "'long'");
+  expectBadInput({ puma_, "far", out_ }, "'far'");
+}
+
+TEST_F(RecordBag, RefusesFilesThatCannotBeWritten)
+{
+  expectBadInput({ nomad_, "way", path("none/out.bag") }, path("none/out.bag"));
+  std::filesystem::create_directory(path("folder"));
+  expectBadInput({ nomad_, "way", path("folder") }, path("folder"));
+  expectBadInput({ nomad_, "way", out_, "--rate", "50" }, out_, "trap \"\" XFSZ; ulimit -f 400");  // as on a full disk
+}
+
+TEST_F(RecordBag, SparesAnOldBagWhenItFails)
+{
+  const std::string old = writeText("old.bag", "old");
+  EXPECT_EQ(run({ nomad_, "crash", old }).status, 2);
+  EXPECT_EQ(textOf(old), "old");
+}
+
+/** A folder of images with poses, as others recorded it. */
+class RecordImages : public RecordBag
+{
+protected:
+  RecordImages()
+  {
+    std::filesystem::create_directories(path("walk/images"));
+    cv::Mat picture(60, 80, CV_8UC3);
+    for (const std::string name : { "7.png", "8.png", "9.png" })
+    {
+      cv::randu(picture, 0, 255);
+      EXPECT_TRUE(cv::imwrite(path("walk/images/" + name), picture));
+    }
+    writeText("walk/K.txt", "5e1 0 39\n0 51 29\n0 0 1\n");
+    writePoses(
+        "# a remark\n7.png 1 0 0 0.1  0 1 0 0.2  0 0 1 0.3  0 0 0 1\n"
+        "9.png 0 0 1 1  -1 0 0 2  0 -1 0 3  0 0 0 1\n");
+  }
+
+  void writePoses(const std::string& text) const
+  {
+    writeText("walk/poses.txt", text);
+  }
+
+  std::vector<std::string> arguments() const
+  {
+    return { "--images", path("walk"), out_ };
+  }
+};
+
+TEST_F(RecordImages, AreWrittenWithTheirPoses)
+{
+  ASSERT_EQ(run(arguments()).status, 0);
+  const std::map<std::string, int> expected{ { CAMERA_INFOS, 2 }, { IMAGES, 2 }, { TRUTH, 2 } };
+  EXPECT_EQ(topicsOf(out_), expected);
+  const std::vector<Image> images = messagesOf<Image>(out_, IMAGES);
+  EXPECT_EQ(toGrey(images[1], "image").size(), cv::Size(80, 60));
+  EXPECT_EQ(images[1].header.stamp, ros::Time(1000.25));
+  EXPECT_EQ(images[1].encoding, sensor_msgs::image_encodings::MONO8);
+  const CameraInfo info = messagesOf<CameraInfo>(out_, CAMERA_INFOS)[1];
+  EXPECT_EQ(info.header, images[1].header);
+  EXPECT_EQ(info.K[0], 50.0);
+  EXPECT_EQ(info.P[6], 29.0);
+  EXPECT_EQ(info.width, 80U);
+  const Eigen::Isometry3d pose = sim::toIsometry(messagesOf<Truth>(out_, TRUTH)[1].pose);
+  EXPECT_TRUE(pose.translation().isApprox(Eigen::Vector3d(1.0, 2.0, 3.0)));
+  EXPECT_TRUE(pose.linear().col(2).isApprox(Eigen::Vector3d::UnitX()));
+  const std::string bytes = textOf(out_);
+  ASSERT_EQ(run(arguments()).status, 0);
+  EXPECT_EQ(textOf(out_), bytes);
+}
+
+TEST_F(RecordImages, RefusesBadFolders)
+{
+  expectBadInput({ "--images", path("none"), out_ }, path("none"));
+  expectBadInput({ "--images", path("walk") }, "OUT.bag");
+  expectBadInput({ "--images", path("walk"), "desk", "way", out_ }, "OUT.bag");
+  expectBadInput({ "--images", path("walk"), out_, "--seed", "3" }, "--seed");
+  for (const std::string line :
+       { "7.png 1 2 3", "7.png 2 0 0 0  0 2 0 0  0 0 2 0  0 0 0 1", "7.png 1 0 0 nan  0 1 0 0  0 0 1 0  0 0 0 1",
+         "7.png 1 0 0 0  0 1 0 0  0 0 -1 0  0 0 0 1" })
+  {
+    writePoses("# remark\n" + line + "\n");
+    expectBadInput(arguments(), "poses.txt: line 2 ");
+  }
+  writePoses("# nothing\n");
+  expectBadInput(arguments(), "poses.txt");
+  writePoses("7.png 1 0 0 0.1  0 1 0 0.2  0 0 1 0.3  0 0 0 1\ngone.png 1 0 0 0  0 1 0 0  0 0 1 0  0 0 0 1\n");
+  expectBadInput(arguments(), "gone.png");
+  ASSERT_TRUE(cv::imwrite(path("walk/images/gone.png"), cv::Mat(30, 40, CV_8U, cv::Scalar(0))));
+  expectBadInput(arguments(), "gone.png");
+  writeText("walk/K.txt", "1 2 3");
+  expectBadInput(arguments(), "K.txt");
+}
+
+TEST_F(RecordImages, AreThoseOfARealWalk)
+{
+  const char* data = std::getenv("VIEW_SERVO_DATA");
+  if (data == nullptr)
+  {
+    GTEST_SKIP() << "VIEW_SERVO_DATA is not set";
+  }
+  ASSERT_EQ(run({ "--images", std::string(data) + "/hololens_indoor", out_ }).status, 0);
+  EXPECT_EQ(topicsOf(out_).at(IMAGES), 94);
+  EXPECT_EQ(topicsOf(out_).at(TRUTH), 94);
+  EXPECT_LT(std::filesystem::file_size(out_), 15'000'000U);
+  // The folder's own relative pose of two images, first in its list of pairs: X_6 = T X_1.
+  const std::vector<Truth> truths = messagesOf<Truth>(out_, TRUTH);
+  const Eigen::Isometry3d relative = sim::toIsometry(truths[5].pose).inverse() * sim::toIsometry(truths[0].pose);
+  EXPECT_LT((relative.translation() - Eigen::Vector3d(0.13428, 0.10470, -0.29566)).norm(), 2e-4);
+}
+
+}  // namespace
+}  // namespace test
+}  // namespace view_servo
