@@ -124,7 +124,28 @@ public:
     return result.model ? std::optional<Fit>({ *result.model, std::move(result.inliers) }) : std::nullopt;
   }
 
-  /** Probability that a match made by chance agrees with a model. */
+  /**
+   * How often the reference position of one match and the current one of another agree with a matrix. Often, when the
+   * positions lie along an epipolar line, say the edge of a floor: then they agree whatever they are matched with.
+   */
+  double chanceAmong(const Correspondences& matches, const Eigen::Matrix3d& matrix) const
+  {
+    constexpr std::size_t TRIED = 5000;
+    std::size_t tried = 0;
+    std::size_t agreeing = 0;
+    for (std::size_t shift = 1; shift < matches.size() && tried < TRIED; ++shift)
+    {
+      for (std::size_t i = 0; i < matches.size(); ++i)
+      {
+        const Correspondence mixed{ matches[i].reference, matches[(i + shift) % matches.size()].current };
+        agreeing += agrees(matrix, mixed) ? 1 : 0;
+      }
+      tried += matches.size();
+    }
+    return tried > 0 ? static_cast<double>(agreeing) / static_cast<double>(tried) : 0.0;
+  }
+
+  /** Probability that a match made by chance, anywhere in the image, agrees with a model. */
   double chance(const cv::Size& current) const
   {
     const double area = static_cast<double>(current.area());
@@ -277,14 +298,15 @@ public:
     {
       return false;
     }
-    result.log_significance = logSignificance(pairs.size(), fit->inliers.size(), geometry_.sampleSize(),
-                                              geometry_.chance(current_.image(levels_.current).size()));
     Correspondences supporting;
     for (const int i : fit->inliers)
     {
       inliers_.push_back(candidates_[static_cast<std::size_t>(i)]);
       supporting.push_back(pairs[static_cast<std::size_t>(i)]);
     }
+    const double chance = std::max(geometry_.chance(current_.image(levels_.current).size()),
+                                   geometry_.chanceAmong(supporting, fit->matrix));
+    result.log_significance = logSignificance(pairs.size(), supporting.size(), geometry_.sampleSize(), chance);
     if (result.log_significance < min_significance_ || !keepsOrientation(supporting))
     {
       inliers_.clear();
