@@ -231,12 +231,12 @@ cv::Mat SimulatedCamera::render(const Eigen::Isometry3d& camera)
   const cv::Mat drawn(context_->size, CV_8UC4, context_->buffer.data());
   cv::Mat grey;
   cv::extractChannel(drawn, grey, 0);
-  cv::Mat radiance;
-  grey.convertTo(radiance, CV_32F);
   if (quality_.supersampling > 1)
   {
-    cv::resize(radiance, radiance, pinhole_size_, 0.0, 0.0, cv::INTER_AREA);
+    cv::resize(grey, grey, pinhole_size_, 0.0, 0.0, cv::INTER_AREA);
   }
+  cv::Mat radiance;
+  grey.convertTo(radiance, CV_32F);
   if (!map_u_.empty())
   {
     cv::remap(radiance, radiance, map_u_, map_v_, cv::INTER_LINEAR);
