@@ -259,7 +259,7 @@ private:
 
   void takeImage()
   {
-    constexpr int EXPOSED = 5;  // poses over the exposure
+    constexpr int EXPOSED = 5;  // poses over the exposure, whose middle the stamp tells
     std::vector<Eigen::Isometry3d> poses;
     ros::Time stamp;
     {
@@ -272,10 +272,12 @@ private:
       if (exposure > 0.0 && !last_view_.empty() && last_view_.front().time < now.time)
       {
         const std::vector<Waypoint> way = { last_view_.front(), now };
-        for (int i = 1; i < EXPOSED; ++i)
+        poses.clear();
+        for (int i = 0; i < EXPOSED; ++i)
         {
           poses.push_back(poseAt(way, now.time - exposure * i / (EXPOSED - 1)));
         }
+        stamp -= ros::Duration(0.5 * exposure);
       }
       last_view_ = { now };
     }
@@ -289,7 +291,7 @@ private:
       }
       image_publisher_.publish(toImage(image, sensor_msgs::image_encodings::MONO8, info.header), info);
     }
-    ground_truth_publisher_.publish(toGroundTruth(poses.front(), stamp));
+    ground_truth_publisher_.publish(toGroundTruth(poses[poses.size() / 2], stamp));
   }
 
   void diagnose(diagnostic_updater::DiagnosticStatusWrapper& status)

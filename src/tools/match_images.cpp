@@ -1,5 +1,6 @@
 // Copyright (c) 2026, the view_servo authors
 // SPDX-License-Identifier: BSD-3-Clause
+#include "command_line.h"
 #include "view_servo/features/line_segments.h"
 #include "view_servo/geometry/correspondence.h"
 #include "view_servo/matching/line_features.h"
@@ -19,18 +20,13 @@
 #include <opencv2/core/utils/logger.hpp>
 #include <opencv2/imgcodecs.hpp>
 
-#include <fcntl.h>
-#include <unistd.h>
-
 #include <chrono>
-#include <cstdio>
 #include <fstream>
 #include <iostream>
 #include <iterator>
 #include <limits>
 #include <map>
 #include <optional>
-#include <sstream>
 #include <stdexcept>
 #include <string>
 #include <utility>
@@ -76,30 +72,6 @@ struct Options
   std::vector<std::string> settings;
   int threads = 0;
   bool json = false;
-};
-
-/** Keeps standard error quiet: image decoders write there on their own, and users are promised one line. */
-class QuietStandardError
-{
-public:
-  QuietStandardError() : standard_error_(dup(STDERR_FILENO))
-  {
-    const int nowhere = open("/dev/null", O_WRONLY | O_CLOEXEC);
-    dup2(nowhere, STDERR_FILENO);
-    close(nowhere);
-  }
-  ~QuietStandardError()
-  {
-    std::cerr.flush();
-    std::fflush(stderr);
-    dup2(standard_error_, STDERR_FILENO);
-    close(standard_error_);
-  }
-  QuietStandardError(const QuietStandardError&) = delete;
-  QuietStandardError& operator=(const QuietStandardError&) = delete;
-
-private:
-  int standard_error_;
 };
 
 cv::Mat readImage(const std::string& path)
@@ -410,18 +382,6 @@ void listParameters(const std::string& subcommand)
     std::cout << "  " << parameter.name << " (" << parameter.type << ", default " << parameter.get()
               << "): " << parameter.description << '\n';
   }
-}
-
-/** Messages may have several lines; the user is promised one. */
-std::string oneLine(const std::string& text)
-{
-  std::istringstream lines(text);
-  std::string joined;
-  for (std::string line; std::getline(lines >> std::ws, line);)
-  {
-    joined += (joined.empty() ? "" : " ") + line;
-  }
-  return joined;
 }
 
 /** What both subcommands take. `more_settings` are positional. */

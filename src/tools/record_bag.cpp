@@ -1,5 +1,6 @@
 // Copyright (c) 2026, the view_servo authors
 // SPDX-License-Identifier: BSD-3-Clause
+#include "command_line.h"
 #include "sim/nomad.h"
 #include "sim/puma.h"
 #include "sim/renderer.h"
@@ -17,12 +18,8 @@
 #include <boost/make_shared.hpp>
 #include <opencv2/core/utils/logger.hpp>
 
-#include <fcntl.h>
-#include <unistd.h>
-
 #include <cmath>
 #include <cstdint>
-#include <cstdio>
 #include <filesystem>
 #include <fstream>
 #include <iostream>
@@ -93,30 +90,6 @@ struct Options
   std::optional<double> odometry_drift;
   std::optional<double> odometry_noise;
   std::optional<double> encoder_noise;
-};
-
-/** Keeps standard error quiet: libraries write there on their own, and users are promised one line. */
-class QuietStandardError
-{
-public:
-  QuietStandardError() : standard_error_(dup(STDERR_FILENO))
-  {
-    const int nowhere = open("/dev/null", O_WRONLY | O_CLOEXEC);
-    dup2(nowhere, STDERR_FILENO);
-    close(nowhere);
-  }
-  ~QuietStandardError()
-  {
-    std::cerr.flush();
-    std::fflush(stderr);
-    dup2(standard_error_, STDERR_FILENO);
-    close(standard_error_);
-  }
-  QuietStandardError(const QuietStandardError&) = delete;
-  QuietStandardError& operator=(const QuietStandardError&) = delete;
-
-private:
-  int standard_error_;
 };
 
 /** A bag that appears under its name when it is complete. */
@@ -696,18 +669,6 @@ void record(const Options& options)
     throw BadInput("say what to record and where to: record_bag WORLD TRAJECTORY OUT.bag");
   }
   recordSimulation(options.names[0], options.names[1], options.names[2], options);
-}
-
-/** Messages may have several lines; the user is promised one. */
-std::string oneLine(const std::string& text)
-{
-  std::istringstream lines(text);
-  std::string joined;
-  for (std::string line; std::getline(lines >> std::ws, line);)
-  {
-    joined += (joined.empty() ? "" : " ") + line;
-  }
-  return joined;
 }
 
 }  // namespace

@@ -109,7 +109,9 @@ TEST_F(NomadSim, OdometryTfAndGroundTruthTellOfOneMotion)
 {
   const geometry_msgs::PoseStamped start = *truth_.last();
   const Eigen::Isometry3d tf_start = cameraByTf(start.header.stamp);
-  driveFor(1.5, 0.2, -0.1, 0.15);
+  const Eigen::Vector3d from = cameraByTruth().translation();
+  ASSERT_TRUE(
+      waitUntil([&] { return (cameraByTruth().translation() - from).norm() > 0.25; }, [&] { drive(0.2, -0.1, 0.15); }));
   waitForFreshTruth();
   const geometry_msgs::PoseStamped end = *truth_.last();
   const Eigen::Isometry3d true_motion = sim::toIsometry(start.pose).inverse() * sim::toIsometry(end.pose);
@@ -133,8 +135,7 @@ TEST_F(NomadSim, OdometryTfAndGroundTruthTellOfOneMotion)
 
 TEST_F(NomadSim, StandsAQuarterOfASecondAfterTheLastCommand)
 {
-  driveFor(0.8, 0.4, 0.0, 0.0);
-  EXPECT_GT(speed(), 0.3);
+  ASSERT_TRUE(waitUntil([&] { return speed() > 0.3; }, [&] { drive(0.4, 0.0, 0.0); }));
   drive(0.4, 0.0, 0.0);
   const ros::WallTime last = ros::WallTime::now();
   ASSERT_TRUE(waitUntil([&] { return speed() == 0.0; }));
@@ -155,9 +156,8 @@ TEST_F(NomadSim, RefusesCommandsThatAreNotFinite)
   driveFor(0.5, std::numeric_limits<double>::quiet_NaN(), 0.1, 0.0);
   waitForFreshTruth();
   EXPECT_TRUE(cameraByTruth().isApprox(before, 1e-9));
-  driveFor(0.5, 0.1, 0.0, 0.0);
-  waitForFreshTruth();
-  EXPECT_GT((cameraByTruth().translation() - before.translation()).norm(), 0.01);
+  EXPECT_TRUE(waitUntil([&] { return (cameraByTruth().translation() - before.translation()).norm() > 0.01; },
+                        [&] { drive(0.1, 0.0, 0.0); }));
 }
 
 TEST_F(NomadSim, RefusesPosesInsideFurniture)

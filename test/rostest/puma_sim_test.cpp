@@ -119,7 +119,9 @@ TEST_F(PumaSim, TfAndGroundTruthTellOfOneMotion)
 {
   const geometry_msgs::PoseStamped start = *truth_.last();
   const Eigen::Isometry3d tf_start = cameraByTf(start.header.stamp);
-  moveFor(1.0, twist(0.02, -0.03, -0.04, 0.03, -0.02, 0.1));
+  const Eigen::Vector3d from = cameraByTruth().translation();
+  ASSERT_TRUE(waitUntil([&] { return (cameraByTruth().translation() - from).norm() > 0.04; },
+                        [&] { move(twist(0.02, -0.03, -0.04, 0.03, -0.02, 0.1)); }));
   waitForFreshTruth();
   const geometry_msgs::PoseStamped end = *truth_.last();
   const Eigen::Isometry3d true_motion = toIsometry(start.pose).inverse() * toIsometry(end.pose);
@@ -138,8 +140,7 @@ TEST_F(PumaSim, TfAndGroundTruthTellOfOneMotion)
 
 TEST_F(PumaSim, StandsAQuarterOfASecondAfterTheLastCommand)
 {
-  moveFor(0.6, twist(0.0, 0.0, -0.05, 0.0, 0.0, 0.2));
-  EXPECT_GT(speed(), 0.05);
+  ASSERT_TRUE(waitUntil([&] { return speed() > 0.05; }, [&] { move(twist(0.0, 0.0, -0.05, 0.0, 0.0, 0.2)); }));
   move(twist(0.0, 0.0, -0.05, 0.0, 0.0, 0.2));
   const ros::WallTime last = ros::WallTime::now();
   ASSERT_TRUE(waitUntil([&] { return speed() == 0.0; }));
