@@ -1,30 +1,21 @@
 // Copyright (c) 2026, the view_servo authors
 // SPDX-License-Identifier: BSD-3-Clause
 // Matching on recorded runs, image by image, each compared with where the camera truly was.
-#include "sim/robot_messages.h"
 #include "sim/world.h"
+#include "support/recorded_bag.h"
 #include "support/temporary_directory.h"
-#include "view_servo/geometry/fundamental.h"
 #include "view_servo/geometry/homography.h"
-#include "view_servo/ros/conversions.h"
 #include "view_servo/views/line_view_matcher.h"
 #include "view_servo/views/prepared_image.h"
 #include "view_servo/views/view_matcher.h"
 
-#include <geometry_msgs/PoseStamped.h>
 #include <gtest/gtest.h>
-#include <rosbag/bag.h>
-#include <rosbag/view.h>
-#include <sensor_msgs/CameraInfo.h>
-#include <sensor_msgs/Image.h>
 
 #include <algorithm>
 #include <cmath>
 #include <cstdlib>
 #include <fstream>
 #include <iterator>
-#include <limits>
-#include <map>
 #include <string>
 #include <utility>
 #include <vector>
@@ -59,46 +50,6 @@ std::string shippedWorld(const std::string& name)
   return { std::istreambuf_iterator<char>(file), {} };
 }
 
-/** What a bag says of one image. */
-struct Frame
-{
-  double time;  // since the bag's start [s]
-  cv::Mat image;
-  Camera camera;
-  Eigen::Isometry3d pose;  // world from optical frame
-};
-
-std::vector<Frame> framesOf(const std::string& file)
-{
-  const rosbag::Bag bag(file);
-  rosbag::View view(bag);
-  std::map<ros::Time, Frame> frames;
-  std::map<ros::Time, Eigen::Isometry3d> poses;
-  for (const rosbag::MessageInstance& instance : view)
-  {
-    if (const auto image = instance.instantiate<sensor_msgs::Image>())
-    {
-      frames[image->header.stamp].image = toGrey(*image, "image");
-    }
-    else if (const auto info = instance.instantiate<sensor_msgs::CameraInfo>())
-    {
-      frames[info->header.stamp].camera = toCamera(*info);
-    }
-    else if (const auto truth = instance.instantiate<geometry_msgs::PoseStamped>())
-    {
-      poses[truth->header.stamp] = sim::toIsometry(truth->pose);
-    }
-  }
-  std::vector<Frame> result;
-  for (auto& [stamp, frame] : frames)
-  {
-    frame.time = (stamp - view.getBeginTime()).toSec();
-    frame.pose = poses.at(stamp);
-    result.push_back(frame);
-  }
-  return result;
-}
-
 /** Records a trajectory of a world given as text, one image a second. */
 std::vector<Frame> record(const std::string& world, const std::string& trajectory)
 {
@@ -121,48 +72,6 @@ double turnBetween(const Frame& a, const Frame& b)
 double distanceBetween(const Frame& a, const Frame& b)
 {
   return (a.pose.translation() - b.pose.translation()).norm();
-}
-
-/** How two frames truly lie to each other. */
-class TrueGeometry
-{
-public:
-  TrueGeometry(const Frame& reference, const Frame& current)
-  {
-    const Eigen::Isometry3d motion = current.pose.inverse() * reference.pose;
-    const Eigen::Vector3d& t = motion.translation();
-    const Eigen::Matrix3d k_inverse = reference.camera.k.inverse();
-    Eigen::Matrix3d t_cross;
-    t_cross << 0.0, -t.z(), t.y(), t.z(), 0.0, -t.x(), -t.y(), t.x(), 0.0;
-    fundamental_ = current.camera.k.inverse().transpose() * t_cross * motion.linear() * k_inverse;
-    far_away_ = current.camera.k * motion.linear() * k_inverse;
-    constexpr double NO_MOTION = 1e-3;  // [m]; then all points move as those far away
-    moved_ = t.norm() > NO_MOTION;
-  }
-
-  /** Distance of a pair from what is possible [px]. */
-  double error(const Correspondence& pair) const
-  {
-    return moved_ ? std::sqrt(sampsonError(fundamental_, pair))
-                  : (transfer(far_away_, pair.reference) - pair.current).norm();
-  }
-
-private:
-  Eigen::Matrix3d fundamental_;
-  Eigen::Matrix3d far_away_;
-  bool moved_;
-};
-
-/** NaN when there are none. */
-double median(std::vector<double> values)
-{
-  if (values.empty())
-  {
-    return std::numeric_limits<double>::quiet_NaN();
-  }
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
 }
 
 /** The errors of what counts as an inlier [px]. */

@@ -2,6 +2,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "node_test.h"
 #include "sim/robot_messages.h"
+#include "support/recorded_bag.h"
 #include "support/temporary_directory.h"
 
 #include "view_servo/LineMatches.h"
@@ -158,21 +159,21 @@ protected:
     directory_.reset();
   }
 
-  static void setViews()
+  static void setViews(const std::string& view = "first")
   {
     for (const char* node : { "point_matcher", "line_matcher" })
     {
       SetView::Request request;
-      request.view = "first";
+      request.view = view;
       SetView::Response response;
       ASSERT_TRUE(ros::service::call(std::string(node) + "/set_view", request, response));
       ASSERT_TRUE(response.success) << response.message;
     }
   }
 
-  static std::vector<std::string> player(const std::vector<std::string>& more)
+  static std::vector<std::string> player(const std::vector<std::string>& more, const std::string& bag = bag_)
   {
-    std::vector<std::string> command{ "rosbag", "play", "--clock", "--quiet", bag_ };
+    std::vector<std::string> command{ "rosbag", "play", "--clock", "--quiet", bag };
     command.insert(command.end(), more.begin(), more.end());
     return command;
   }
@@ -297,6 +298,96 @@ TEST_F(BagReplayTest, NodesMayStartLate)
   expectTrue(points);
   expectTrue(lines);
 }
+
+/** A trajectory of one of the package's worlds. */
+struct ShippedRun
+{
+  const char* world;
+  const char* trajectory;
+};
+
+/** Plays a run to the matchers, whose view is its last image. */
+class ShippedRunTest : public BagReplayTest, public ::testing::WithParamInterface<ShippedRun>
+{
+protected:
+  /** Those that count as inliers must lie where the camera's true motion lets them. */
+  static void expectPossible(const std::vector<PointMatch>& points, const TrueGeometry& truth, double limit)
+  {
+    std::vector<double> errors;
+    for (const PointMatch& point : points)
+    {
+      if (point.inlier)
+      {
+        errors.push_back(
+            truth.error({ { point.reference_x, point.reference_y }, { point.current_x, point.current_y } }));
+      }
+    }
+    EXPECT_LT(median(errors), limit);
+  }
+};
+
+TEST_P(ShippedRunTest, EachImageIsAnsweredTrulyOrRefused)
+{
+  const std::string bag = directory_->path() / (std::string(GetParam().world) + "_" + GetParam().trajectory + ".bag");
+  const std::string command = "'" RECORD_BAG_BINARY "' '" PACKAGE_DIR "/config/worlds/" +
+                              std::string(GetParam().world) + ".yaml' " + GetParam().trajectory + " '" + bag +
+                              "' --rate 1";
+  ASSERT_EQ(std::system(command.c_str()), 0) << command;
+  const std::vector<Frame> frames = framesOf(bag);
+  StoredView last;
+  last.name = "last";
+  last.image = frames.back().image;
+  for (const char* node : { "point_matcher", "line_matcher" })
+  {
+    ViewStore(viewsDir(node)).save(last, true);
+  }
+  setViews("last");
+  const Recorder<PointMatches> points("point_matches");
+  const Recorder<LineMatches> lines("line_matches");
+  // An image a second; on a busy machine a matcher may leave one out while it searches all scales for a lost view.
+  const Process play(player({ "--wait-for-subscribers", "--topics", "/camera/image_raw", "/camera/camera_info" }, bag));
+  for (const Frame& frame : { frames[frames.size() / 2], frames.back() })
+  {
+    ASSERT_TRUE(waitUntil([&] {
+      return points.last() && lines.last() && points.last()->header.stamp >= frame.stamp &&
+             lines.last()->header.stamp >= frame.stamp;
+    })) << "no answer at "
+        << frame.time << " s";
+  }
+  EXPECT_GE(10 * points.messages().size(), 7 * frames.size());
+  EXPECT_GE(10 * lines.messages().size(), 7 * frames.size());
+  int answered = 0;
+  for (const Frame& frame : frames)
+  {
+    SCOPED_TRACE("at " + std::to_string(frame.time) + " s");
+    const TrueGeometry truth(frames.back(), frame);
+    for (const PointMatches& answer : points.messages())
+    {
+      if (answer.header.stamp == frame.stamp && answer.homography.valid)
+      {
+        ++answered;
+        expectPossible(answer.matches, truth, 1.5);
+      }
+    }
+    for (const LineMatches& answer : lines.messages())
+    {
+      if (answer.header.stamp == frame.stamp && !answer.points.empty())
+      {
+        expectPossible(answer.points, truth, 3.0);  // intersections are less certain than corners
+      }
+    }
+  }
+  EXPECT_GE(answered, 4);
+}
+
+INSTANTIATE_TEST_SUITE_P(Worlds, ShippedRunTest,
+                         ::testing::Values(ShippedRun{ "desk", "approach" }, ShippedRun{ "desk", "lose" },
+                                           ShippedRun{ "cabinet", "approach" }, ShippedRun{ "corridor", "approach" },
+                                           ShippedRun{ "rice", "approach" }, ShippedRun{ "rice", "lose" },
+                                           ShippedRun{ "mouse", "approach" }, ShippedRun{ "mouse", "pass" }),
+                         [](const ::testing::TestParamInfo<ShippedRun>& run) {
+                           return std::string(run.param.world) + "_" + run.param.trajectory;
+                         });
 
 }  // namespace
 }  // namespace test
