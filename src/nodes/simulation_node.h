@@ -2,8 +2,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include "nodes/robot_messages.h"
 #include "sim/renderer.h"
-#include "sim/robot_messages.h"
 #include "sim/world.h"
 #include "view_servo/SetLight.h"
 #include "view_servo/SetPose.h"

@@ -1,10 +1,10 @@
 // Copyright (c) 2026, the view_servo authors
 // SPDX-License-Identifier: BSD-3-Clause
 #include "command_line.h"
+#include "nodes/robot_messages.h"
 #include "sim/nomad.h"
 #include "sim/puma.h"
 #include "sim/renderer.h"
-#include "sim/robot_messages.h"
 #include "sim/world.h"
 #include "view_servo/ros/conversions.h"
 #include "view_servo/views/image_io.h"

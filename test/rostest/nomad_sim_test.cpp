@@ -1,7 +1,7 @@
 // Copyright (c) 2026, the view_servo authors
 // SPDX-License-Identifier: BSD-3-Clause
 #include "node_test.h"
-#include "sim/robot_messages.h"
+#include "nodes/robot_messages.h"
 #include "view_servo/SetLight.h"
 #include "view_servo/SetPose.h"
 

@@ -1,8 +1,8 @@
 // Copyright (c) 2026, the view_servo authors
 // SPDX-License-Identifier: BSD-3-Clause
 // Runs the program itself, as a shell would, and reads what it wrote.
+#include "nodes/robot_messages.h"
 #include "sim/puma.h"
-#include "sim/robot_messages.h"
 #include "sim/world.h"
 #include "support/temporary_directory.h"
 #include "view_servo/ros/conversions.h"
