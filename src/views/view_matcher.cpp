@@ -8,6 +8,7 @@
 #include "view_servo/geometry/homography.h"
 #include "view_servo/robust/fundamental_estimator.h"
 #include "view_servo/robust/homography_estimator.h"
+#include "view_servo/robust/significance.h"
 
 #include <Eigen/Geometry>
 #include <Eigen/LU>
@@ -69,28 +70,6 @@ std::vector<Trial> trials(const ViewMatcherParams& params)
   return result;
 }
 
-double log10Choose(double n, double k)
-{
-  return (std::lgamma(n + 1.0) - std::lgamma(k + 1.0) - std::lgamma(n - k + 1.0)) / std::log(10.0);
-}
-
-/**
- * -log10 of the number of models with this many inliers to be expected among matches made by chance (a-contrario,
- * Moisan & Stival 2004): (n - s) C(n, k) C(k, s) p^(k - s), with p the probability that a random point agrees.
- */
-double logSignificance(std::size_t candidates, std::size_t inliers, int sample_size, double probability)
-{
-  if (inliers <= static_cast<std::size_t>(sample_size))
-  {
-    return 0.0;
-  }
-  const double n = static_cast<double>(candidates);
-  const double k = static_cast<double>(inliers);
-  const double log_false_alarms = std::log10(n - sample_size) + log10Choose(n, k) + log10Choose(k, sample_size) +
-                                  (k - sample_size) * std::log10(probability);
-  return -log_false_alarms;
-}
-
 struct Fit
 {
   Eigen::Matrix3d matrix;
@@ -122,27 +101,6 @@ public:
     auto result = ransac(FundamentalEstimator(pairs, view_threshold), ransac_params, rng);
     statistics = result.statistics;
     return result.model ? std::optional<Fit>({ *result.model, std::move(result.inliers) }) : std::nullopt;
-  }
-
-  /**
-   * How often the reference position of one match and the current one of another agree with a matrix. Often, when the
-   * positions lie along an epipolar line, say the edge of a floor: then they agree whatever they are matched with.
-   */
-  double chanceAmong(const Correspondences& matches, const Eigen::Matrix3d& matrix) const
-  {
-    constexpr std::size_t TRIED = 5000;
-    std::size_t tried = 0;
-    std::size_t agreeing = 0;
-    for (std::size_t shift = 1; shift < matches.size() && tried < TRIED; ++shift)
-    {
-      for (std::size_t i = 0; i < matches.size(); ++i)
-      {
-        const Correspondence mixed{ matches[i].reference, matches[(i + shift) % matches.size()].current };
-        agreeing += agrees(matrix, mixed) ? 1 : 0;
-      }
-      tried += matches.size();
-    }
-    return tried > 0 ? static_cast<double>(agreeing) / static_cast<double>(tried) : 0.0;
   }
 
   /** Probability that a match made by chance, anywhere in the image, agrees with a model. */
@@ -304,8 +262,10 @@ public:
       inliers_.push_back(candidates_[static_cast<std::size_t>(i)]);
       supporting.push_back(pairs[static_cast<std::size_t>(i)]);
     }
-    const double chance = std::max(geometry_.chance(current_.image(levels_.current).size()),
-                                   geometry_.chanceAmong(supporting, fit->matrix));
+    const double among = chanceAmong(supporting.size(), [&](std::size_t reference, std::size_t current) {
+      return geometry_.agrees(fit->matrix, { supporting[reference].reference, supporting[current].current });
+    });
+    const double chance = std::max(geometry_.chance(current_.image(levels_.current).size()), among);
     result.log_significance = logSignificance(pairs.size(), supporting.size(), geometry_.sampleSize(), chance);
     if (result.log_significance < min_significance_ || !keepsOrientation(supporting))
     {

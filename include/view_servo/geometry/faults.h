@@ -4,10 +4,35 @@
 
 #include <stdexcept>
 #include <string>
+#include <utility>
 #include <vector>
 
 namespace view_servo
 {
+/** Collects what is wrong with parameters, for their validate(). */
+class Faults
+{
+public:
+  void require(bool condition, std::string fault)
+  {
+    if (!condition)
+    {
+      list_.push_back(std::move(fault));
+    }
+  }
+  void add(const std::vector<std::string>& faults)
+  {
+    list_.insert(list_.end(), faults.begin(), faults.end());
+  }
+  const std::vector<std::string>& list() const
+  {
+    return list_;
+  }
+
+private:
+  std::vector<std::string> list_;
+};
+
 /** @throws std::invalid_argument listing the faults of `what`, one a line, when there are any. */
 inline void requireNoFaults(const std::string& what, const std::vector<std::string>& faults)
 {

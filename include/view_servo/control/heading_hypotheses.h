@@ -1,0 +1,74 @@
+// Copyright (c) 2026, the view_servo authors
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include "view_servo/control/heading_vote.h"
+#include "view_servo/geometry/planar_motion.h"
+#include "view_servo/robust/random.h"
+
+#include <cstdint>
+#include <string>
+#include <vector>
+
+namespace view_servo
+{
+/** Options of the hypotheses of where the stored view is. */
+struct HeadingHypothesesParams
+{
+  double inlier_threshold = 3.0;   ///< largest error of a match that supports one [px], > 0
+  double max_yaw = 0.6;            ///< largest turn between the views that is looked for [rad], (0, pi/2)
+  double min_significance = 6.0;   ///< -log10 of the number of false alarms that one may have at first, >= 0
+  double memory = 0.7;             ///< part of its weight that one keeps from matches to matches, [0, 1)
+  int max_hypotheses = 5;          ///< kept, those with most weight, >= 1
+  double assumed_distance = 1.0;   ///< to the view until it is known [m], > 0
+  std::uint64_t seed = 1;
+
+  /** All faults, one a line; empty when the parameters are usable. */
+  std::vector<std::string> validate() const;
+};
+
+/** A place where the stored view may have been taken. */
+struct HeadingHypothesis
+{
+  PlanarPose view_in_odom;   ///< of its level camera; the direction from the last camera pose is known, the distance not
+  PlanarPose view_in_camera; ///< as seen from the last camera pose, of distance 1
+  double weight = 0.0;       ///< share of the matches that agree, faded over those before, at most 1 / (1 - memory)
+  int updates = 0;           ///< sets of matches that agreed
+  Correspondences support;   ///< last matches that agree
+};
+
+/**
+ * Several headings and yaws kept over time (thesis 5.5 asks for it): the motions that each set of matches suggests, found
+ * by RANSAC among all and among what the best leaves, confirm hypotheses or add new ones. One that repeated structure
+ * suggests now and then fades; the true one gains from all sets.
+ */
+class HeadingHypotheses
+{
+public:
+  /** @param focal_length of the level camera [px]. The parameters must be valid. */
+  HeadingHypotheses(const HeadingHypothesesParams& params, double focal_length);
+
+  /** Takes matches of an image taken at a pose of the level camera in odometry's frame. */
+  void update(const Correspondences& matches, const PlanarPose& camera_in_odom);
+
+  /** Most weight first. */
+  const std::vector<HeadingHypothesis>& list() const
+  {
+    return hypotheses_;
+  }
+
+  void clear()
+  {
+    hypotheses_.clear();
+  }
+
+private:
+  void confirm(HeadingHypothesis& hypothesis, const Correspondences& matches, const PlanarPose& camera_in_odom);
+
+  HeadingHypothesesParams params_;
+  double threshold_;  ///< in units of level points
+  Rng rng_;
+  std::vector<HeadingHypothesis> hypotheses_;
+};
+
+}  // namespace view_servo

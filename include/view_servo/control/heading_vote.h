@@ -1,0 +1,82 @@
+// Copyright (c) 2026, the view_servo authors
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include "view_servo/geometry/correspondence.h"
+
+#include <cstddef>
+#include <optional>
+#include <string>
+#include <vector>
+
+namespace view_servo
+{
+/** Matched level points (planar_motion.h) with what the matcher thinks of each. */
+struct HeadingEvidence
+{
+  Correspondences pairs;
+  std::vector<double> weights;  ///< one for each, >= 0
+};
+
+/** Options of the heading vote. */
+struct HeadingVoteParams
+{
+  int bins = 181;               ///< of the histogram over [-pi/2, pi/2], >= 3
+  double margin = 0.17;         ///< K: headings nearer to +-pi/2 are too uncertain to be taken [rad], [0, pi/2)
+  double smoothing = 0.02;      ///< sd of the Gaussian that votes are spread by [rad], >= 0
+  double narrowing = 0.7;       ///< of the region of interest when the global maximum is inside, (0, 1]
+  double widening = 1.3;        ///< of it when it is not, >= 1
+  double min_half_width = 0.1;  ///< of the region [rad], > 0
+
+  /** All faults, one a line; empty when the parameters are usable. */
+  std::vector<std::string> validate() const;
+};
+
+/**
+ * Votes for the direction to the stored view (thesis 5.2). Each match gives the line through its reference and its
+ * current position, both seen with the reference's orientation; where it meets the horizon is a candidate epipole. The
+ * histogram runs over headings in the current camera, from -pi/2 (right) to pi/2 (left). It does not tell ahead from
+ * behind.
+ */
+class HeadingHistogram
+{
+public:
+  HeadingHistogram() = default;
+  /** @param yaw of the reference camera in the current one [rad]; 0 in the thesis, which forbids rotation. */
+  HeadingHistogram(const HeadingEvidence& evidence, double yaw, const HeadingVoteParams& params);
+
+  const std::vector<double>& votes() const
+  {
+    return votes_;
+  }
+  /** Heading of a bin's middle [rad]. */
+  double heading(std::size_t bin) const;
+  /** The bin with most votes whose heading lies in [min, max]; empty when none has any. */
+  std::optional<std::size_t> peak(double min, double max) const;
+
+private:
+  std::vector<double> votes_;
+};
+
+/** Where the next heading is expected (thesis 5.2): at first everywhere but near +-pi/2, then around the last one. */
+class HeadingRegion
+{
+public:
+  explicit HeadingRegion(const HeadingVoteParams& params);
+
+  double min() const;
+  double max() const;
+
+  /**
+   * The heading of the highest peak inside; moves the region there, and narrows or widens it. Empty, and the region
+   * stays, when there is no vote inside.
+   */
+  std::optional<double> choose(const HeadingHistogram& histogram);
+
+private:
+  HeadingVoteParams params_;
+  double centre_ = 0.0;
+  double half_width_;
+};
+
+}  // namespace view_servo

@@ -1,0 +1,159 @@
+// Copyright (c) 2026, the view_servo authors
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include "view_servo/control/arrival_detector.h"
+#include "view_servo/control/heading_hypotheses.h"
+#include "view_servo/control/heading_vote.h"
+#include "view_servo/control/odometry_history.h"
+#include "view_servo/control/velocity_limiter.h"
+#include "view_servo/geometry/camera.h"
+#include "view_servo/geometry/planar_motion.h"
+#include "view_servo/tracking/view_tracker.h"
+
+#include <opencv2/core/mat.hpp>
+
+#include <limits>
+#include <memory>
+#include <string>
+#include <vector>
+
+namespace view_servo
+{
+enum class HomingMode
+{
+  SERVO,  ///< all that this package knows
+  THESIS  ///< chapter 5 as it is printed: no rotation, goal ahead, steps, stop by correlation
+};
+
+/** Options of homing. */
+struct HomingParams
+{
+  HomingMode mode = HomingMode::SERVO;
+  HeadingVoteParams vote;
+  HeadingHypothesesParams hypotheses;
+  ArrivalDetectorParams arrival;
+  ViewTrackerParams tracker;
+  double lost_timeout = 10.0;  ///< without a trace of the view, after which homing gives up [s], > 0
+
+  // Mode SERVO.
+  double gain = 1.0;                   ///< of the approach: speed per distance [1/s], > 0
+  double turn_gain = 1.0;              ///< turn rate per yaw error [1/s], > 0
+  double blind_speed = 0.1;            ///< while only the heading is known [m/s], > 0
+  double distance_tolerance = 0.003;   ///< of having arrived [m], > 0
+  double yaw_tolerance = 0.0035;       ///< likewise [rad], > 0
+  double dwell = 0.5;                  ///< time that the base has to stay within the tolerances [s], >= 0
+  double docking_displacement = 40.0;  ///< of the view's points, below which homing docks [px], > 0
+  double min_similarity = 0.3;         ///< of the gradients where homing may end, [-1, 1)
+
+  // Mode THESIS.
+  double step = 0.02;        ///< between two headings [m], > 0
+  double near_step = 0.01;   ///< after the rise of the correlation [m], > 0
+  double step_speed = 0.08;  ///< [m/s], > 0
+
+  /** All faults, one a line; empty when the parameters are usable. */
+  std::vector<std::string> validate() const;
+};
+
+enum class HomingState
+{
+  ACQUIRING,    ///< the view has not been found yet
+  APPROACHING,  ///< its direction is known
+  NEAR,         ///< what is seen begins to look like it
+  DOCKING,      ///< the last part, in image space
+  ARRIVED,
+  LOST,   ///< it was known and is not found any more; the base waits
+  FAILED  ///< given up
+};
+
+/** What homing knows after an image. NaN where it does not. */
+struct HomingReport
+{
+  double stamp = 0.0;  ///< of the image
+  HomingState state = HomingState::ACQUIRING;
+  std::string reason;  ///< of the state, in one line
+  double heading = std::numeric_limits<double>::quiet_NaN();  ///< direction to the view's base pose, in base_link [rad]
+  double yaw_error = std::numeric_limits<double>::quiet_NaN();  ///< that the base has yet to turn by [rad]
+  double distance = std::numeric_limits<double>::quiet_NaN();   ///< left to drive [m]
+  double confidence = 0.0;  ///< share of the matches or points that agree, [0, 1]
+  std::vector<double> histogram;
+  double roi_min = std::numeric_limits<double>::quiet_NaN();  ///< [rad]
+  double roi_max = std::numeric_limits<double>::quiet_NaN();
+  double similarity = std::numeric_limits<double>::quiet_NaN();  ///< gradient correlation, -1..1
+  double displacement = std::numeric_limits<double>::quiet_NaN();  ///< median, of the view's points [px]
+  int inliers = 0;
+};
+
+/** What homing goes back to. */
+struct HomingTarget
+{
+  cv::Mat image;  ///< 8-bit, one channel
+  Camera camera;  ///< calibrated; of the stored and the current images
+  CameraMount mount;
+};
+
+/**
+ * Brings a holonomic base back to where a view was stored, from what is matched in the camera's images and from its
+ * odometry. Knows no ROS; times are those of the images [s] and may run at any speed, but not back.
+ */
+class Homing
+{
+public:
+  virtual ~Homing() = default;
+  Homing(const Homing&) = delete;
+  Homing& operator=(const Homing&) = delete;
+
+  /** Base in odometry's frame. */
+  void addOdometry(double stamp, const PlanarPose& base_in_odom)
+  {
+    odometry_.add(stamp, base_in_odom);
+  }
+
+  /**
+   * Matches of an image, in pixels of the raw images, with a weight each. They may come after newer images, and from
+   * several matchers in turn.
+   */
+  void addMatches(double stamp, const Correspondences& pixels, const std::vector<double>& weights);
+
+  /** @param grey 8-bit, one channel. @throws std::invalid_argument when it has another size than the stored view. */
+  void addImage(double stamp, const cv::Mat& grey);
+
+  /** What the base should do now, by the newest odometry, before limits; zero unless it is known where to go. */
+  virtual BaseVelocity command() = 0;
+
+  const HomingReport& report() const
+  {
+    return report_;
+  }
+
+protected:
+  Homing(const HomingParams& params, HomingTarget target);
+
+  virtual void takeMatches(double stamp, const HeadingEvidence& evidence, const PlanarPose& camera_in_odom) = 0;
+  virtual void takeImage(double stamp, const cv::Mat& grey) = 0;
+
+  void setState(HomingState state, const std::string& reason)
+  {
+    report_.state = state;
+    report_.reason = reason;
+  }
+  bool ended() const
+  {
+    return report_.state == HomingState::ARRIVED || report_.state == HomingState::FAILED;
+  }
+
+  HomingParams params_;
+  HomingTarget target_;
+  OdometryHistory odometry_;
+  HomingReport report_;
+  double started_;     ///< stamp of the first image; NaN before it
+  double last_trace_;  ///< stamp of the last sign of the view
+
+private:
+  cv::Mat reference_gradients_;
+};
+
+/** @throws std::invalid_argument with all faults of the parameters, or saying what the target lacks. */
+std::unique_ptr<Homing> makeHoming(const HomingParams& params, const HomingTarget& target);
+
+}  // namespace view_servo

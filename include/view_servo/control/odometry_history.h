@@ -1,0 +1,45 @@
+// Copyright (c) 2026, the view_servo authors
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include "view_servo/geometry/planar_motion.h"
+
+#include <deque>
+#include <optional>
+
+namespace view_servo
+{
+/** Where the base was, by its odometry, over the last seconds. Times are those of the messages [s]. */
+class OdometryHistory
+{
+public:
+  /** @param duration kept [s]. */
+  explicit OdometryHistory(double duration) : duration_(duration)
+  {
+  }
+
+  /** Base in odometry's frame. When time has gone back, what was known before is forgotten. */
+  void add(double stamp, const PlanarPose& pose);
+
+  /** Interpolated; up to `reach` [s] beyond the newest it is taken to go on as it did. Empty where nothing is known. */
+  std::optional<PlanarPose> at(double stamp, double reach = 0.2) const;
+
+  std::optional<PlanarPose> newest() const;
+
+  void clear()
+  {
+    entries_.clear();
+  }
+
+private:
+  struct Entry
+  {
+    double stamp;
+    PlanarPose pose;
+  };
+
+  double duration_;
+  std::deque<Entry> entries_;
+};
+
+}  // namespace view_servo

@@ -1,0 +1,113 @@
+// Copyright (c) 2026, the view_servo authors
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include "view_servo/geometry/camera.h"
+#include "view_servo/geometry/correspondence.h"
+#include "view_servo/geometry/planar_motion.h"
+
+#include <Eigen/Core>
+#include <opencv2/core/mat.hpp>
+
+#include <optional>
+#include <string>
+#include <vector>
+
+namespace view_servo
+{
+/** Options of the view tracker. */
+struct ViewTrackerParams
+{
+  int max_landmarks = 200;     ///< points of the stored view that are tracked, >= 8
+  int window = 21;             ///< side of the patches [px], odd, >= 5
+  int levels = 2;              ///< of the pyramid besides the image, >= 0
+  double max_residual = 2.0;   ///< of a point that supports the pose [px], > 0
+  int min_supporting = 15;     ///< points that make a pose, >= 4
+  double min_support = 0.35;   ///< part of the points looked for that makes one, (0, 1]
+  double max_scale_difference = 0.35;  ///< between a point's change of size and the typical one; others are left out, > 0
+  double assumed_depth = 2.5;  ///< of points when nothing is known [m], > 0
+
+  /** All faults, one a line; empty when the parameters are usable. */
+  std::vector<std::string> validate() const;
+};
+
+/**
+ * Follows the stored view from a camera that moves on the floor, in image space: points of the stored view, whose depth
+ * is known from two views but for one common scale, are found in each image where the last pose and odometry predict
+ * them (Lucas & Kanade, in an image normalised against light), and the pose is what explains their positions. Points are
+ * always compared with the stored view itself, so nothing drifts; and where the view is reached all displacements are
+ * zero, whatever the depths, so that the pose ends exact although the epipole says nothing there (thesis 5.4).
+ *
+ * Poses are those of the stored view's level camera in the current one. Their unit of length is that of the pose that
+ * the structure came from.
+ */
+class ViewTracker
+{
+public:
+  /** @param reference 8-bit, one channel. The parameters must be valid. */
+  ViewTracker(const cv::Mat& reference, const Camera& camera, const CameraMount& mount, const ViewTrackerParams& params);
+
+  bool hasStructure() const
+  {
+    return !landmarks_.empty();
+  }
+  void clear()
+  {
+    landmarks_.clear();
+  }
+
+  /** Whether the landmarks' depths came from two views far enough apart; else they are assumed. */
+  bool depthsKnown() const
+  {
+    return depths_known_;
+  }
+
+  /**
+   * Landmarks from matches (level points) that agree with a motion; their depths are in the unit of `pose`. Where the
+   * motion is too small to tell depths, params.assumed_depth is taken.
+   * @return false, and nothing changes, when there are too few.
+   */
+  bool start(const Correspondences& matches, const PlanarPose& pose);
+
+  /** More landmarks from such matches, and better depths for those there are. */
+  void extend(const Correspondences& matches, const PlanarPose& pose);
+
+  struct Result
+  {
+    bool found = false;
+    PlanarPose pose;            ///< valid when found
+    int looked_for = 0;         ///< landmarks predicted to be in the image
+    int supporting = 0;         ///< landmarks found where the pose explains it
+    double rms = 0.0;           ///< of these [px]
+    double displacement = 0.0;  ///< median distance between where these are and where the stored view has them [px]
+  };
+
+  /** Finds the landmarks in an image. @param predicted pose expected. @throws std::invalid_argument for another size. */
+  Result track(const cv::Mat& current, const PlanarPose& predicted) const;
+
+  /** The pose from matches with landmarks, without prediction. */
+  Result locate(const Correspondences& matches) const;
+
+private:
+  struct Point
+  {
+    Landmark landmark;
+    double information;  ///< of the inverse depth
+    Eigen::Vector2d pixel;  ///< in the stored view
+  };
+
+  Eigen::Vector2d pixelOf(const Eigen::Vector2d& level_point) const;
+  Eigen::Vector2d levelOf(const Eigen::Vector2d& pixel) const;
+  bool insideReference(const Eigen::Vector2d& pixel) const;
+  const Point* nearest(const Eigen::Vector2d& level_point) const;
+  Result fit(const std::vector<Sighting>& sightings, const PlanarPose& initial) const;
+
+  Camera camera_;
+  CameraMount mount_;
+  ViewTrackerParams params_;
+  cv::Mat reference_;  // normalised against light
+  std::vector<Point> landmarks_;
+  bool depths_known_ = false;
+};
+
+}  // namespace view_servo

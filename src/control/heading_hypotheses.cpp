@@ -1,0 +1,160 @@
+// Copyright (c) 2026, the view_servo authors
+// SPDX-License-Identifier: BSD-3-Clause
+#include "view_servo/control/heading_hypotheses.h"
+
+#include "view_servo/geometry/faults.h"
+#include "view_servo/geometry/fundamental.h"
+#include "view_servo/robust/planar_motion_estimator.h"
+#include "view_servo/robust/ransac.h"
+#include "view_servo/robust/significance.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace view_servo
+{
+namespace
+{
+constexpr int SUGGESTIONS = 2;             // motions that one set of matches may suggest
+constexpr double SAME_HEADING = 0.12;      // [rad]
+constexpr double SAME_YAW = 0.05;          // [rad]
+constexpr double LEAST_PART = 0.05;        // of the largest weight, below which a hypothesis is forgotten
+constexpr double EPIPOLAR_BAND = 1.2;      // typical length of an epipolar line in an image, in units of level points
+constexpr double IMAGE_AREA = 1.1;         // of level points, of an ordinary lens
+
+Correspondences agreeing(const Correspondences& matches, const PlanarMotion& motion, double threshold, bool wanted)
+{
+  const PlanarMotionEstimator estimator(matches, M_PI);
+  Correspondences result;
+  for (std::size_t i = 0; i < matches.size(); ++i)
+  {
+    if ((estimator.error(motion, i) <= threshold * threshold) == wanted)
+    {
+      result.push_back(matches[i]);
+    }
+  }
+  return result;
+}
+
+bool same(const PlanarPose& a, const PlanarPose& b)
+{
+  return std::abs(wrapAngle(a.heading() - b.heading())) < SAME_HEADING && std::abs(wrapAngle(a.yaw - b.yaw)) < SAME_YAW;
+}
+
+}  // namespace
+
+std::vector<std::string> HeadingHypothesesParams::validate() const
+{
+  Faults faults;
+  faults.require(inlier_threshold > 0.0, "inlier_threshold must be more than 0 px");
+  faults.require(max_yaw > 0.0 && max_yaw < M_PI_2, "max_yaw must lie in (0, pi/2)");
+  faults.require(min_significance >= 0.0, "min_significance must be at least 0");
+  faults.require(memory >= 0.0 && memory < 1.0, "memory must lie in [0, 1)");
+  faults.require(max_hypotheses >= 1, "max_hypotheses must be at least 1");
+  faults.require(assumed_distance > 0.0, "assumed_distance must be more than 0 m");
+  return faults.list();
+}
+
+HeadingHypotheses::HeadingHypotheses(const HeadingHypothesesParams& params, double focal_length)
+  : params_(params), threshold_(params.inlier_threshold / focal_length), rng_(params.seed)
+{
+}
+
+void HeadingHypotheses::update(const Correspondences& matches, const PlanarPose& camera_in_odom)
+{
+  for (HeadingHypothesis& hypothesis : hypotheses_)
+  {
+    hypothesis.weight *= params_.memory;
+    confirm(hypothesis, matches, camera_in_odom);
+  }
+
+  Correspondences left = matches;
+  for (int i = 0; i < SUGGESTIONS; ++i)
+  {
+    RansacParams ransac_params;
+    ransac_params.inlier_threshold = threshold_;
+    ransac_params.sampling = Sampling::UNIFORM;
+    const auto found = ransac(PlanarMotionEstimator(left, params_.max_yaw), ransac_params, rng_);
+    if (!found.model)
+    {
+      break;
+    }
+    const Correspondences support = select(left, found.inliers);
+    const double by_area = 2.0 * threshold_ * EPIPOLAR_BAND / IMAGE_AREA;
+    const double among = chanceAmong(support.size(), [&](std::size_t reference, std::size_t current) {
+      return sampsonError(found.model->essential, { support[reference].reference, support[current].current }) <=
+             threshold_ * threshold_;
+    });
+    if (logSignificance(left.size(), support.size(), PlanarMotionEstimator::SAMPLE_SIZE, std::max(by_area, among)) <
+        params_.min_significance)
+    {
+      break;
+    }
+    const PlanarPose& motion = found.model->pose;
+    const bool known = std::any_of(hypotheses_.begin(), hypotheses_.end(), [&motion](const HeadingHypothesis& hypothesis) {
+      return same(hypothesis.view_in_camera, motion);
+    });
+    if (!known)
+    {
+      HeadingHypothesis hypothesis;
+      const PlanarPose guess{ params_.assumed_distance * motion.x, params_.assumed_distance * motion.y, motion.yaw };
+      hypothesis.view_in_odom = compose(camera_in_odom, guess);
+      confirm(hypothesis, matches, camera_in_odom);
+      hypotheses_.push_back(hypothesis);
+    }
+    left = agreeing(left, *found.model, threshold_, false);
+  }
+
+  std::stable_sort(hypotheses_.begin(), hypotheses_.end(),
+                   [](const HeadingHypothesis& a, const HeadingHypothesis& b) { return a.weight > b.weight; });
+  for (std::size_t i = 0; i < hypotheses_.size();)
+  {
+    // Those that have become the same, that nothing speaks for any more, or that are too many.
+    bool drop = i >= static_cast<std::size_t>(params_.max_hypotheses) ||
+                hypotheses_[i].weight < LEAST_PART * hypotheses_.front().weight;
+    for (std::size_t k = 0; k < i && !drop; ++k)
+    {
+      drop = same(hypotheses_[k].view_in_camera, hypotheses_[i].view_in_camera);
+    }
+    if (drop)
+    {
+      hypotheses_.erase(hypotheses_.begin() + static_cast<std::ptrdiff_t>(i));
+    }
+    else
+    {
+      ++i;
+    }
+  }
+}
+
+void HeadingHypotheses::confirm(HeadingHypothesis& hypothesis, const Correspondences& matches,
+                                const PlanarPose& camera_in_odom)
+{
+  constexpr double WIDE = 3.0;      // times the threshold, for matches that a prediction is corrected by
+  constexpr double CLOSEST = 0.05;  // the least distance that a hypothesis keeps [m]
+  const PlanarPose predicted = compose(inverse(camera_in_odom), hypothesis.view_in_odom);
+  const double distance = std::max(predicted.distance(), CLOSEST);
+  PlanarMotion motion({ std::cos(predicted.heading()), std::sin(predicted.heading()), predicted.yaw });
+  for (const double width : { WIDE, 1.0 })
+  {
+    const Correspondences support = agreeing(matches, motion, width * threshold_, true);
+    if (support.size() > static_cast<std::size_t>(PlanarMotionEstimator::SAMPLE_SIZE))
+    {
+      motion = PlanarMotion(refinePlanarMotion(motion.pose, support));
+    }
+  }
+  Correspondences support = agreeing(matches, motion, threshold_, true);
+  if (matches.empty() || static_cast<double>(support.size()) < LEAST_PART * static_cast<double>(matches.size()))
+  {
+    hypothesis.view_in_camera = { std::cos(predicted.heading()), std::sin(predicted.heading()), predicted.yaw };
+    return;
+  }
+  hypothesis.view_in_camera = motion.pose;
+  hypothesis.view_in_odom =
+      compose(camera_in_odom, { distance * motion.pose.x, distance * motion.pose.y, motion.pose.yaw });
+  hypothesis.weight += static_cast<double>(support.size()) / static_cast<double>(matches.size());
+  hypothesis.support = std::move(support);
+  ++hypothesis.updates;
+}
+
+}  // namespace view_servo

@@ -1,0 +1,480 @@
+// Copyright (c) 2026, the view_servo authors
+// SPDX-License-Identifier: BSD-3-Clause
+#include "view_servo/control/homing.h"
+
+#include "view_servo/geometry/faults.h"
+#include "view_servo/geometry/fundamental.h"
+
+#include <algorithm>
+#include <cmath>
+#include <deque>
+#include <optional>
+#include <stdexcept>
+#include <utility>
+
+namespace view_servo
+{
+namespace
+{
+constexpr double ODOMETRY_KEPT = 10.0;  // [s]
+constexpr double NOT_A_NUMBER = std::numeric_limits<double>::quiet_NaN();
+
+/** Chapter 5 as printed. */
+class ThesisHoming : public Homing
+{
+public:
+  ThesisHoming(const HomingParams& params, const HomingTarget& target)
+    : Homing(params, target), region_(params.vote), arrival_(params.arrival)
+  {
+  }
+
+  BaseVelocity command() override
+  {
+    const std::optional<PlanarPose> base = odometry_.newest();
+    if (!base || !moving_ || ended())
+    {
+      return BaseVelocity::Zero();
+    }
+    const PlanarPose done = compose(inverse(step_start_), *base);
+    const double left = step_length_ - done.distance();
+    if (left <= 0.0)
+    {
+      moving_ = false;
+      step_end_known_ = false;
+      return BaseVelocity::Zero();
+    }
+    // The step's direction is that of the pose where it began; slower towards its end.
+    constexpr double SLOWING = 4.0;  // [1/s]
+    const double speed = std::min(params_.step_speed, SLOWING * left + 0.01);
+    const double direction = step_heading_ - done.yaw;
+    return { speed * std::cos(direction), speed * std::sin(direction), 0.0 };
+  }
+
+protected:
+  void takeMatches(double stamp, const HeadingEvidence& evidence, const PlanarPose& /*camera_in_odom*/) override
+  {
+    if (moving_ || ended() || !step_end_known_ || stamp < step_end_ || !(similarity_stamp_ >= step_end_))
+    {
+      return;  // not yet seen from where the last step ended
+    }
+    const HeadingHistogram histogram(evidence, 0.0, params_.vote);
+    report_.histogram = histogram.votes();
+    const std::optional<double> chosen = region_.choose(histogram);
+    report_.roi_min = region_.min();
+    report_.roi_max = region_.max();
+    if (!chosen)
+    {
+      return;
+    }
+    last_trace_ = stamp;
+    double sum = 0.0;
+    for (const double vote : histogram.votes())
+    {
+      sum += vote;
+    }
+    const std::optional<std::size_t> bin = histogram.peak(*chosen, *chosen);
+    report_.confidence = bin && sum > 0.0 ? histogram.votes()[*bin] / sum : 0.0;
+    report_.inliers = static_cast<int>(evidence.pairs.size());
+
+    const Arrival arrival = arrival_.add(report_.similarity);
+    if (arrival == Arrival::REACHED)
+    {
+      setState(HomingState::ARRIVED, "the correlation has dropped after its rise");
+      return;
+    }
+    step_length_ = arrival == Arrival::NEAR ? params_.near_step : params_.step;
+    // The camera's heading in base_link. Without rotation the base moves as the camera does.
+    step_heading_ = target_.mount.on_base.yaw + *chosen;
+    report_.heading = wrapAngle(step_heading_);
+    report_.yaw_error = 0.0;
+    step_start_ = *odometry_.newest();
+    moving_ = true;
+    setState(arrival == Arrival::NEAR ? HomingState::NEAR : HomingState::APPROACHING,
+             arrival == Arrival::NEAR ? "the correlation has risen" : "the heading is known");
+  }
+
+  void takeImage(double stamp, const cv::Mat& /*grey*/) override
+  {
+    constexpr double AT_REST = 0.003;  // moved between two images of a base that stands [m]
+    const std::optional<PlanarPose> base = odometry_.at(stamp);
+    if (!base || moving_)
+    {
+      last_base_.reset();
+      return;
+    }
+    if (last_base_ && !step_end_known_ && compose(inverse(*last_base_), *base).distance() < AT_REST)
+    {
+      step_end_ = stamp;
+      step_end_known_ = true;
+    }
+    last_base_ = base;
+    similarity_stamp_ = stamp;
+  }
+
+private:
+  HeadingRegion region_;
+  ArrivalDetector arrival_;
+  bool moving_ = false;
+  double step_heading_ = 0.0;  // in the base's frame at its beginning
+  double step_length_ = 0.0;
+  PlanarPose step_start_;
+  bool step_end_known_ = false;
+  double step_end_ = 0.0;  // stamp of the first image at rest
+  double similarity_stamp_ = NOT_A_NUMBER;
+  std::optional<PlanarPose> last_base_;
+};
+
+/** Hypotheses from matches, then the view's points in image space. */
+class ServoHoming : public Homing
+{
+public:
+  ServoHoming(const HomingParams& params, const HomingTarget& target)
+    : Homing(params, target),
+      hypotheses_(params.hypotheses, target.camera.k(0, 0)),
+      tracker_(target.image, target.camera, target.mount, params.tracker)
+  {
+  }
+
+  BaseVelocity command() override
+  {
+    const std::optional<PlanarPose> base = odometry_.newest();
+    if (!base || !view_in_odom_ || ended() || report_.state == HomingState::LOST ||
+        report_.state == HomingState::ACQUIRING)
+    {
+      return BaseVelocity::Zero();
+    }
+    const PlanarPose goal = goalInBase(*base);
+    double speed = params_.gain * goal.distance();
+    if (blind_)
+    {
+      speed = std::min(speed, params_.blind_speed);
+    }
+    const double heading = goal.heading();
+    return { speed * std::cos(heading), speed * std::sin(heading), params_.turn_gain * goal.yaw };
+  }
+
+protected:
+  void takeMatches(double stamp, const HeadingEvidence& evidence, const PlanarPose& camera_in_odom) override
+  {
+    hypotheses_.update(evidence.pairs, camera_in_odom);
+    const bool any = !hypotheses_.list().empty();
+    const PlanarPose followed =
+        view_in_odom_ ? compose(inverse(camera_in_odom), *view_in_odom_) :
+                        (any ? hypotheses_.list().front().view_in_camera : PlanarPose());
+    report_.histogram = HeadingHistogram(evidence, followed.yaw, params_.vote).votes();
+    if (ended() || !any)
+    {
+      return;
+    }
+    const HeadingHypothesis& best = hypotheses_.list().front();
+    if (best.updates < MIN_UPDATES || best.support.empty())
+    {
+      return;
+    }
+    const bool located = tracker_.hasStructure() && !tracked_ && locate(stamp, evidence.pairs, camera_in_odom);
+    if (tracked_ || located)
+    {
+      checkStructure(best, evidence.pairs, camera_in_odom);
+    }
+    if (!tracker_.hasStructure())
+    {
+      const PlanarPose unit = best.view_in_camera;
+      const double distance = compose(inverse(camera_in_odom), best.view_in_odom).distance();
+      if (tracker_.start(best.support, { distance * unit.x, distance * unit.y, unit.yaw }))
+      {
+        scale_ = 1.0;
+        trail_.clear();
+        contradictions_ = 0;
+      }
+    }
+    if (!tracked_ && !located)
+    {
+      // Follow the direction; the next image may say more.
+      follow(stamp, best.view_in_odom);
+      report_.confidence = static_cast<double>(best.support.size()) / static_cast<double>(evidence.pairs.size());
+      report_.inliers = static_cast<int>(best.support.size());
+    }
+  }
+
+  void takeImage(double stamp, const cv::Mat& grey) override
+  {
+    const std::optional<PlanarPose> base = odometry_.at(stamp);
+    if (!base || ended())
+    {
+      return;
+    }
+    const PlanarPose camera = compose(*base, target_.mount.on_base);
+    tracked_ = false;
+    if (tracker_.hasStructure() && view_in_odom_)
+    {
+      const PlanarPose predicted = compose(inverse(camera), *view_in_odom_);
+      const ViewTracker::Result result =
+          tracker_.track(grey, { predicted.x / scale_, predicted.y / scale_, predicted.yaw });
+      if (result.found)
+      {
+        tracked_ = true;
+        correctScale(camera, result.pose);
+        report_.inliers = result.supporting;
+        report_.confidence = static_cast<double>(result.supporting) / result.looked_for;
+        report_.displacement = result.displacement;
+        follow(stamp, compose(camera, { scale_ * result.pose.x, scale_ * result.pose.y, result.pose.yaw }));
+      }
+    }
+    judge(stamp, *base);
+  }
+
+private:
+  static constexpr int MIN_UPDATES = 2;  // sets of matches that agree before a hypothesis is followed
+
+  /** The view's base pose as seen from the base. */
+  PlanarPose goalInBase(const PlanarPose& base) const
+  {
+    return target_.mount.ofBase(compose(inverse(compose(base, target_.mount.on_base)), *view_in_odom_));
+  }
+
+  void follow(double stamp, const PlanarPose& view_in_odom)
+  {
+    view_in_odom_ = view_in_odom;
+    blind_ = !tracked_;
+    last_trace_ = std::max(stamp, last_trace_);
+  }
+
+  /** After the points were not found: where are they by matches? */
+  bool locate(double stamp, const Correspondences& matches, const PlanarPose& camera)
+  {
+    const ViewTracker::Result result = tracker_.locate(matches);
+    if (!result.found)
+    {
+      return false;
+    }
+    follow(stamp, compose(camera, { scale_ * result.pose.x, scale_ * result.pose.y, result.pose.yaw }));
+    return true;
+  }
+
+  /** Matches that agree with the structure extend it; several sets that agree more with another motion end it. */
+  void checkStructure(const HeadingHypothesis& best, const Correspondences& matches, const PlanarPose& camera)
+  {
+    constexpr double CLEARLY_LESS = 0.7;
+    constexpr int MAX_CONTRADICTIONS = 3;
+    const PlanarPose pose = compose(inverse(camera), *view_in_odom_);
+    const double threshold = params_.hypotheses.inlier_threshold / target_.camera.k(0, 0);
+    const Eigen::Matrix3d essential = essentialMatrix(pose);
+    Correspondences agreeing;
+    for (const Correspondence& match : matches)
+    {
+      if (sampsonError(essential, match) <= threshold * threshold && inverseDepth(match, pose).value > 0.0)
+      {
+        agreeing.push_back(match);
+      }
+    }
+    if (static_cast<double>(agreeing.size()) < CLEARLY_LESS * static_cast<double>(best.support.size()))
+    {
+      if (++contradictions_ >= MAX_CONTRADICTIONS)
+      {
+        tracker_.clear();
+        tracked_ = false;
+      }
+      return;
+    }
+    contradictions_ = 0;
+    tracker_.extend(agreeing, { pose.x / scale_, pose.y / scale_, pose.yaw });
+  }
+
+  /** The unit of the structure, from how far odometry says the camera has moved within it. */
+  void correctScale(const PlanarPose& camera_in_odom, const PlanarPose& view_in_camera)
+  {
+    constexpr double LONGEST = 0.3;   // of the motion compared: near the end, recent motion counts [m]
+    constexpr double SHORTEST = 0.08;  // [m]
+    constexpr double WEIGHT = 0.2;
+    constexpr double MAX_CHANGE = 4.0;
+    const PlanarPose camera_in_view = inverse(view_in_camera);
+    trail_.push_back({ camera_in_odom, camera_in_view });
+    while (trail_.size() > 2 && compose(inverse(trail_[1].in_odom), camera_in_odom).distance() > LONGEST)
+    {
+      trail_.pop_front();
+    }
+    const double by_odometry = compose(inverse(trail_.front().in_odom), camera_in_odom).distance();
+    const double by_view =
+        std::hypot(camera_in_view.x - trail_.front().in_view.x, camera_in_view.y - trail_.front().in_view.y);
+    if (by_odometry >= SHORTEST && by_view > 0.0)
+    {
+      const double measured = std::clamp(by_odometry / by_view, scale_ / MAX_CHANGE, scale_ * MAX_CHANGE);
+      scale_ *= std::pow(measured / scale_, WEIGHT);
+    }
+  }
+
+  /** State, arrival and loss after an image. */
+  void judge(double stamp, const PlanarPose& base)
+  {
+    constexpr double COAST = 0.5;  // matches are older than the image when they come [s]
+    if (!view_in_odom_)
+    {
+      giveUpAfter(stamp, started_, "the view was not found", HomingState::ACQUIRING, "looking for the view");
+      return;
+    }
+    const PlanarPose goal = goalInBase(base);
+    report_.heading = goal.heading();
+    report_.yaw_error = goal.yaw;
+    report_.distance = goal.distance();
+    const double half_width = std::clamp(std::atan2(params_.vote.min_half_width, report_.distance),
+                                         params_.vote.min_half_width, M_PI_2);
+    report_.roi_min = report_.heading - half_width;
+    report_.roi_max = report_.heading + half_width;
+
+    const bool blank = std::isnan(report_.similarity);
+    if (blank || stamp - last_trace_ > (blind_ ? COAST : 0.0))
+    {
+      within_since_ = NOT_A_NUMBER;
+      giveUpAfter(stamp, last_trace_, "the view was lost", HomingState::LOST,
+                  blank ? "the image shows nothing" : "the view is not found any more");
+      return;
+    }
+    if (!tracked_)
+    {
+      within_since_ = NOT_A_NUMBER;
+      setState(HomingState::APPROACHING, "the heading is known");
+      return;
+    }
+    const bool within = report_.distance <= params_.distance_tolerance && std::abs(goal.yaw) <= params_.yaw_tolerance &&
+                        report_.similarity >= params_.min_similarity;
+    if (!within)
+    {
+      within_since_ = NOT_A_NUMBER;
+    }
+    else if (std::isnan(within_since_))
+    {
+      within_since_ = stamp;
+    }
+    if (within && stamp - within_since_ >= params_.dwell)
+    {
+      setState(HomingState::ARRIVED, "the views agree");
+    }
+    else if (report_.displacement <= params_.docking_displacement)
+    {
+      setState(HomingState::DOCKING, "the view's points are nearly in place");
+    }
+    else if (report_.displacement <= 2.0 * params_.docking_displacement)
+    {
+      setState(HomingState::NEAR, "the view's points are near their place");
+    }
+    else
+    {
+      setState(HomingState::APPROACHING, "the view's points are tracked");
+    }
+  }
+
+  void giveUpAfter(double stamp, double since, const std::string& failure, HomingState waiting,
+                   const std::string& why)
+  {
+    if (stamp - since > params_.lost_timeout)
+    {
+      setState(HomingState::FAILED, failure);
+    }
+    else
+    {
+      setState(waiting, why);
+    }
+  }
+
+  struct Place
+  {
+    PlanarPose in_odom;
+    PlanarPose in_view;
+  };
+
+  HeadingHypotheses hypotheses_;
+  ViewTracker tracker_;
+  std::optional<PlanarPose> view_in_odom_;  // the view's level camera
+  double scale_ = 1.0;                      // metres in a unit of the tracker's
+  std::deque<Place> trail_;                 // of the camera, newest last
+  bool tracked_ = false;                    // in the last image
+  bool blind_ = true;                       // what was followed last were matches
+  double within_since_ = NOT_A_NUMBER;
+  int contradictions_ = 0;
+};
+
+}  // namespace
+
+std::vector<std::string> HomingParams::validate() const
+{
+  Faults faults;
+  faults.add(vote.validate());
+  faults.add(hypotheses.validate());
+  faults.add(arrival.validate());
+  faults.add(tracker.validate());
+  faults.require(lost_timeout > 0.0, "lost_timeout must be more than 0 s");
+  faults.require(gain > 0.0, "gain must be more than 0 1/s");
+  faults.require(turn_gain > 0.0, "turn_gain must be more than 0 1/s");
+  faults.require(blind_speed > 0.0, "blind_speed must be more than 0 m/s");
+  faults.require(distance_tolerance > 0.0, "distance_tolerance must be more than 0 m");
+  faults.require(yaw_tolerance > 0.0, "yaw_tolerance must be more than 0 rad");
+  faults.require(dwell >= 0.0, "dwell must be at least 0 s");
+  faults.require(docking_displacement > 0.0, "docking_displacement must be more than 0 px");
+  faults.require(min_similarity >= -1.0 && min_similarity < 1.0, "min_similarity must lie in [-1, 1)");
+  faults.require(step > 0.0, "step must be more than 0 m");
+  faults.require(near_step > 0.0, "near_step must be more than 0 m");
+  faults.require(step_speed > 0.0, "step_speed must be more than 0 m/s");
+  return faults.list();
+}
+
+Homing::Homing(const HomingParams& params, HomingTarget target)
+  : params_(params),
+    target_(std::move(target)),
+    odometry_(ODOMETRY_KEPT),
+    started_(NOT_A_NUMBER),
+    last_trace_(NOT_A_NUMBER),
+    reference_gradients_(gradientMagnitude(target_.image))
+{
+}
+
+void Homing::addMatches(double stamp, const Correspondences& pixels, const std::vector<double>& weights)
+{
+  const std::optional<PlanarPose> base = odometry_.at(stamp);
+  if (!base)
+  {
+    return;
+  }
+  HeadingEvidence evidence;
+  for (std::size_t i = 0; i < pixels.size(); ++i)
+  {
+    const Correspondence pair{ target_.mount.level(target_.camera.normalized(pixels[i].reference)),
+                               target_.mount.level(target_.camera.normalized(pixels[i].current)) };
+    if (pair.reference.allFinite() && pair.current.allFinite())
+    {
+      evidence.pairs.push_back(pair);
+      evidence.weights.push_back(weights[i]);
+    }
+  }
+  takeMatches(stamp, evidence, compose(*base, target_.mount.on_base));
+}
+
+void Homing::addImage(double stamp, const cv::Mat& grey)
+{
+  if (std::isnan(started_))
+  {
+    started_ = last_trace_ = stamp;
+  }
+  report_.stamp = stamp;
+  report_.similarity = gradientSimilarity(reference_gradients_, gradientMagnitude(grey));
+  takeImage(stamp, grey);
+}
+
+std::unique_ptr<Homing> makeHoming(const HomingParams& params, const HomingTarget& target)
+{
+  requireNoFaults("parameters of homing", params.validate());
+  if (!target.camera.calibrated())
+  {
+    throw std::invalid_argument("the camera is not calibrated");
+  }
+  if (target.image.empty() || target.image.type() != CV_8UC1)
+  {
+    throw std::invalid_argument("the stored view is not an 8-bit grey image");
+  }
+  if (params.mode == HomingMode::THESIS)
+  {
+    return std::make_unique<ThesisHoming>(params, target);
+  }
+  return std::make_unique<ServoHoming>(params, target);
+}
+
+}  // namespace view_servo
