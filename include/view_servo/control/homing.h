@@ -40,7 +40,7 @@ struct HomingParams
   double gain = 1.0;                   ///< of the approach: speed per distance [1/s], > 0
   double turn_gain = 1.0;              ///< turn rate per yaw error [1/s], > 0
   double blind_speed = 0.1;            ///< while only the heading is known [m/s], > 0
-  double distance_tolerance = 0.003;   ///< of having arrived [m], > 0
+  double distance_tolerance = 0.002;   ///< of having arrived [m], > 0
   double yaw_tolerance = 0.0035;       ///< likewise [rad], > 0
   double dwell = 0.5;                  ///< time that the base has to stay within the tolerances [s], >= 0
   double docking_displacement = 40.0;  ///< of the view's points, below which homing docks [px], > 0
