@@ -79,6 +79,7 @@ protected:
     const Arrival arrival = arrival_.add(report_.similarity);
     if (arrival == Arrival::REACHED)
     {
+      report_.at_view = true;
       setState(HomingState::ARRIVED, "the correlation has dropped after its rise");
       return;
     }
@@ -321,6 +322,7 @@ private:
     report_.roi_min = report_.heading - half_width;
     report_.roi_max = report_.heading + half_width;
 
+    report_.at_view = false;
     const bool blank = std::isnan(report_.similarity);
     if (blank || stamp - last_trace_ > (blind_ ? COAST : 0.0))
     {
@@ -335,6 +337,8 @@ private:
       setState(HomingState::APPROACHING, "the heading is known");
       return;
     }
+    report_.at_view = report_.distance <= params_.arrival_distance && std::abs(goal.yaw) <= params_.arrival_yaw &&
+                      report_.similarity >= params_.min_similarity;
     const bool within = report_.distance <= params_.distance_tolerance && std::abs(goal.yaw) <= params_.yaw_tolerance &&
                         report_.similarity >= params_.min_similarity;
     if (!within)
@@ -409,6 +413,8 @@ std::vector<std::string> HomingParams::validate() const
   faults.require(distance_tolerance > 0.0, "distance_tolerance must be more than 0 m");
   faults.require(yaw_tolerance > 0.0, "yaw_tolerance must be more than 0 rad");
   faults.require(dwell >= 0.0, "dwell must be at least 0 s");
+  faults.require(arrival_distance > 0.0, "arrival_distance must be more than 0 m");
+  faults.require(arrival_yaw > 0.0, "arrival_yaw must be more than 0 rad");
   faults.require(docking_displacement > 0.0, "docking_displacement must be more than 0 px");
   faults.require(min_similarity >= -1.0 && min_similarity < 1.0, "min_similarity must lie in [-1, 1)");
   faults.require(step > 0.0, "step must be more than 0 m");

@@ -65,9 +65,7 @@ struct SimulationParams
   /** The world of that name, or in that file, with the noise asked for. */
   World load(RobotKind robot) const
   {
-    const bool is_file = world.find('/') != std::string::npos || world.find(".yaml") != std::string::npos;
-    World result =
-        readWorld(is_file ? world : ros::package::getPath("view_servo") + "/config/worlds/" + world + ".yaml");
+    World result = findWorld(world, ros::package::getPath("view_servo") + "/config/worlds");
     if (result.robot != robot)
     {
       throw std::invalid_argument("world '" + result.name + "' is for another robot");

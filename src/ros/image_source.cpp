@@ -52,12 +52,17 @@ SourceKind kindOf(const ImageSource& source, const std::string& name)
   return given.empty() ? SourceKind::CAMERA : given.front().first;
 }
 
+std::filesystem::path readViewsDir(ParameterReader& reader)
+{
+  std::string views_dir;
+  reader.read("views_dir", views_dir);
+  return views_dir.empty() ? defaultViewsDir() : std::filesystem::path(views_dir);
+}
+
 ImageSourceParams ImageSourceParams::read(ParameterReader& reader)
 {
   ImageSourceParams params;
-  std::string views_dir;
-  reader.read("views_dir", views_dir);
-  params.views_dir = views_dir.empty() ? defaultViewsDir() : std::filesystem::path(views_dir);
+  params.views_dir = readViewsDir(reader);
   reader.read("allow_paths", params.allow_paths);
   return params;
 }

@@ -521,6 +521,12 @@ World readWorld(const std::string& file)
   }
 }
 
+World findWorld(const std::string& file_or_name, const std::string& directory)
+{
+  const bool is_file = file_or_name.find('/') != std::string::npos || file_or_name.find(".yaml") != std::string::npos;
+  return readWorld(is_file ? file_or_name : directory + "/" + file_or_name + ".yaml");
+}
+
 Eigen::Isometry3d planarPose(double x, double y, double yaw)
 {
   Eigen::Isometry3d pose(Eigen::AngleAxisd(yaw, Eigen::Vector3d::UnitZ()));

@@ -100,6 +100,9 @@ struct World
  */
 World readWorld(const std::string& file);
 
+/** Reads a world by its file, or by the name that a file has in a directory. @throws as readWorld(). */
+World findWorld(const std::string& file_or_name, const std::string& directory);
+
 /** Pose on the floor: position (x, y), turned by yaw about z [rad]. */
 Eigen::Isometry3d planarPose(double x, double y, double yaw);
 

@@ -3,121 +3,13 @@
 #include "view_servo/views/matcher_parameters.h"
 
 #include <algorithm>
-#include <cmath>
-#include <cstdint>
 #include <iterator>
-#include <locale>
-#include <sstream>
 #include <stdexcept>
-#include <utility>
 
 namespace view_servo
 {
 namespace
 {
-/** The whole text as one value; locale-independent. */
-template <typename T>
-bool parse(const std::string& text, T& value)
-{
-  std::istringstream stream(text);
-  stream.imbue(std::locale::classic());
-  T parsed{};
-  if (!(stream >> parsed) || !(stream >> std::ws).eof())
-  {
-    return false;
-  }
-  value = parsed;
-  return true;
-}
-
-template <typename T>
-std::string print(const T& value)
-{
-  std::ostringstream stream;
-  stream.imbue(std::locale::classic());
-  stream << value;
-  return stream.str();
-}
-
-template <typename T>
-Parameter number(std::string name, const char* type, T& value, std::string description)
-{
-  return { std::move(name), type, std::move(description), [&value] { return print(value); },
-           [&value](const std::string& text) {
-             return parse(text, value);
-           } };
-}
-
-Parameter integer(std::string name, int& value, std::string description)
-{
-  return number(std::move(name), "int", value, std::move(description));
-}
-
-Parameter real(std::string name, double& value, std::string description)
-{
-  Parameter parameter = number(std::move(name), "double", value, std::move(description));
-  parameter.set = [&value](const std::string& text) {
-    double parsed = 0.0;
-    if (!parse(text, parsed) || !std::isfinite(parsed))
-    {
-      return false;
-    }
-    value = parsed;
-    return true;
-  };
-  return parameter;
-}
-
-Parameter natural(std::string name, std::uint64_t& value, std::string description)
-{
-  Parameter parameter = number(std::move(name), "int", value, std::move(description));
-  parameter.set = [&value](const std::string& text) {
-    return text.find('-') == std::string::npos && parse(text, value);  // streams read -1 as the largest number
-  };
-  return parameter;
-}
-
-/** A choice among words; booleans are the words true and false. */
-template <typename T>
-Parameter choice(std::string name, T& value, std::vector<std::pair<std::string, T>> words, std::string description)
-{
-  std::string type;
-  for (const auto& word : words)
-  {
-    type += (type.empty() ? "" : "|") + word.first;
-  }
-  const auto get = [&value, words] {
-    for (const auto& word : words)
-    {
-      if (word.second == value)
-      {
-        return word.first;
-      }
-    }
-    return std::string();
-  };
-  const auto set = [&value, words](const std::string& text) {
-    for (const auto& word : words)
-    {
-      if (word.first == text)
-      {
-        value = word.second;
-        return true;
-      }
-    }
-    return false;
-  };
-  return { std::move(name), type, std::move(description), get, set };
-}
-
-Parameter boolean(std::string name, bool& value, std::string description)
-{
-  Parameter parameter =
-      choice<bool>(std::move(name), value, { { "true", true }, { "false", false } }, std::move(description));
-  parameter.type = "bool";
-  return parameter;
-}
-
 /** How RANSAC draws its samples is for the caller to offer. */
 void appendRansac(RansacParams& ransac, std::vector<Parameter>& table)
 {

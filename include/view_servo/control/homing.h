@@ -43,6 +43,8 @@ struct HomingParams
   double distance_tolerance = 0.002;   ///< of having arrived [m], > 0
   double yaw_tolerance = 0.0035;       ///< likewise [rad], > 0
   double dwell = 0.5;                  ///< time that the base has to stay within the tolerances [s], >= 0
+  double arrival_distance = 0.01;      ///< to the view, within which it counts as reached though still driving [m], > 0
+  double arrival_yaw = 0.0175;         ///< likewise [rad], > 0
   double docking_displacement = 40.0;  ///< of the view's points, below which homing docks [px], > 0
   double min_similarity = 0.3;         ///< of the gradients where homing may end, [-1, 1)
 
@@ -71,7 +73,8 @@ struct HomingReport
 {
   double stamp = 0.0;  ///< of the image
   HomingState state = HomingState::ACQUIRING;
-  std::string reason;  ///< of the state, in one line
+  std::string reason;                               ///< of the state, in one line
+  bool at_view = false;                             ///< within arrival_distance and arrival_yaw
   double heading = std::numeric_limits<double>::quiet_NaN();  ///< direction to the view's base pose, in base_link [rad]
   double yaw_error = std::numeric_limits<double>::quiet_NaN();  ///< that the base has yet to turn by [rad]
   double distance = std::numeric_limits<double>::quiet_NaN();   ///< left to drive [m]

@@ -42,6 +42,9 @@ struct SourcedImage
   std::optional<ViewPose> pose;
 };
 
+/** `~views_dir` (string, default "" = $ROS_HOME/view_servo/views): where stored views are. */
+std::filesystem::path readViewsDir(ParameterReader& reader);
+
 struct ImageSourceParams
 {
   std::filesystem::path views_dir;

@@ -3,28 +3,14 @@
 #pragma once
 
 #include "view_servo/views/line_view_matcher.h"
+#include "view_servo/views/parameter.h"
 #include "view_servo/views/view_matcher.h"
 
-#include <functional>
 #include <string>
 #include <vector>
 
 namespace view_servo
 {
-/**
- * A parameter by its name, as yaml files, the parameter server and `--set name=value` give it. One table serves all
- * three and the reference in docs/, so a name means the same everywhere.
- */
-struct Parameter
-{
-  std::string name;
-  std::string type;         ///< "int", "double", "bool" or the allowed words, joined by '|'
-  std::string description;  ///< with unit and range
-  std::function<std::string()> get;
-  /** Parses and stores; false (and nothing stored) when the text is not of the type. */
-  std::function<bool(const std::string&)> set;
-};
-
 /** The parameters of matching by points, bound to `params`, which must outlive the table. */
 std::vector<Parameter> matcherParameters(ViewMatcherParams& params);
 

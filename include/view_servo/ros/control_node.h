@@ -1,0 +1,115 @@
+// Copyright (c) 2026, the view_servo authors
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include "view_servo/ServoStatus.h"
+#include "view_servo/ros/node_base.h"
+#include "view_servo/ros/parameters.h"
+
+#include <ros/publisher.h>
+#include <ros/wall_timer.h>
+#include <std_srvs/SetBool.h>
+
+#include <atomic>
+#include <cstdint>
+#include <string>
+
+namespace view_servo
+{
+/**
+ * Whether a node may drive: off at start, switched by the service `~enable` (std_srvs/SetBool). With `~dry_run` (bool,
+ * default false) commands go to other topics, whatever the gate says.
+ */
+class CommandGate
+{
+public:
+  /** Reads `~dry_run`. */
+  explicit CommandGate(ParameterReader& reader);
+
+  std_srvs::SetBool::Response set(bool enabled);
+
+  bool enabled() const
+  {
+    return enabled_;
+  }
+  bool dryRun() const
+  {
+    return dry_run_;
+  }
+  /** Whether commands are to be sent at all. */
+  bool open() const
+  {
+    return enabled_ || dry_run_;
+  }
+
+private:
+  bool dry_run_ = false;
+  std::atomic<bool> enabled_{ false };
+};
+
+/** Publishes a ServoStatus, latched: at once when state or reason changes, else at most ten times a second. */
+class StatusOutput
+{
+public:
+  explicit StatusOutput(ros::NodeHandle& nh);
+
+  void publish(ServoStatus status);
+
+  const ServoStatus& last() const
+  {
+    return last_;
+  }
+
+private:
+  ros::Publisher publisher_;
+  ServoStatus last_;
+  ros::WallTime last_time_;
+};
+
+/** A status without errors or inliers, stamped now. */
+ServoStatus makeStatus(std::uint8_t state, const std::string& reason);
+
+namespace detail
+{
+/** Has SIGINT, SIGTERM and the master's order to shut down only ask for an end, so that a node can stop its robot first. */
+void deferShutdown();
+bool shutdownRequested();
+}  // namespace detail
+
+/**
+ * As runNode(), for a node that drives something: before ROS shuts down, its `stop()` is called, which sends zero.
+ * @return 1 when the node refuses to start.
+ */
+template <typename Node>
+int runControlNode(int argc, char** argv, const std::string& name)
+{
+  constexpr std::uint32_t SPINNER_THREADS = 4;
+  const ros::WallDuration poll(0.01);
+  const ros::WallDuration flush(0.1);  // for the last command to leave
+  ros::init(argc, argv, name, ros::init_options::NoSigintHandler);
+  const ros::NodeHandle nh;
+  detail::deferShutdown();
+  try
+  {
+    Node node(nh, ros::NodeHandle("~"));
+    ros::AsyncSpinner spinner(SPINNER_THREADS);
+    spinner.start();
+    while (ros::ok() && !detail::shutdownRequested())
+    {
+      poll.sleep();
+    }
+    node.stop();
+    flush.sleep();
+    spinner.stop();
+    ros::shutdown();
+    return 0;
+  }
+  catch (const std::exception& error)
+  {
+    ROS_FATAL_STREAM(error.what());
+    ros::shutdown();
+    return 1;
+  }
+}
+
+}  // namespace view_servo
