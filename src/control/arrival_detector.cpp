@@ -17,7 +17,7 @@ namespace view_servo
 {
 cv::Mat gradientMagnitude(const cv::Mat& grey)
 {
-  constexpr double SIGMA = 1.0;        // [px]
+  constexpr double SIGMA = 1.0;  // [px]
   constexpr double SOBEL_SUM = 1.0 / 8.0;
   cv::Mat smooth;
   cv::Mat dx;
@@ -48,7 +48,8 @@ double gradientSimilarity(const cv::Mat& reference, const cv::Mat& current)
   {
     return std::numeric_limits<double>::quiet_NaN();
   }
-  return (reference.dot(current) - static_cast<double>(reference.total()) * reference_mean[0] * current_mean[0]) / scale;
+  return (reference.dot(current) - static_cast<double>(reference.total()) * reference_mean[0] * current_mean[0]) /
+         scale;
 }
 
 std::vector<std::string> ArrivalDetectorParams::validate() const

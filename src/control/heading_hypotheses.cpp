@@ -15,12 +15,12 @@ namespace view_servo
 {
 namespace
 {
-constexpr int SUGGESTIONS = 2;             // motions that one set of matches may suggest
-constexpr double SAME_HEADING = 0.12;      // [rad]
-constexpr double SAME_YAW = 0.05;          // [rad]
-constexpr double LEAST_PART = 0.05;        // of the largest weight, below which a hypothesis is forgotten
-constexpr double EPIPOLAR_BAND = 1.2;      // typical length of an epipolar line in an image, in units of level points
-constexpr double IMAGE_AREA = 1.1;         // of level points, of an ordinary lens
+constexpr int SUGGESTIONS = 2;         // motions that one set of matches may suggest
+constexpr double SAME_HEADING = 0.12;  // [rad]
+constexpr double SAME_YAW = 0.05;      // [rad]
+constexpr double LEAST_PART = 0.05;    // of the largest weight, below which a hypothesis is forgotten
+constexpr double EPIPOLAR_BAND = 1.2;  // typical length of an epipolar line in an image, in units of level points
+constexpr double IMAGE_AREA = 1.1;     // of level points, of an ordinary lens
 
 Correspondences agreeing(const Correspondences& matches, const PlanarMotion& motion, double threshold, bool wanted)
 {
@@ -91,9 +91,9 @@ void HeadingHypotheses::update(const Correspondences& matches, const PlanarPose&
       break;
     }
     const PlanarPose& motion = found.model->pose;
-    const bool known = std::any_of(hypotheses_.begin(), hypotheses_.end(), [&motion](const HeadingHypothesis& hypothesis) {
-      return same(hypothesis.view_in_camera, motion);
-    });
+    const bool known =
+        std::any_of(hypotheses_.begin(), hypotheses_.end(),
+                    [&motion](const HeadingHypothesis& hypothesis) { return same(hypothesis.view_in_camera, motion); });
     if (!known)
     {
       HeadingHypothesis hypothesis;

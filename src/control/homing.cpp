@@ -159,9 +159,8 @@ protected:
   {
     hypotheses_.update(evidence.pairs, camera_in_odom);
     const bool any = !hypotheses_.list().empty();
-    const PlanarPose followed =
-        view_in_odom_ ? compose(inverse(camera_in_odom), *view_in_odom_) :
-                        (any ? hypotheses_.list().front().view_in_camera : PlanarPose());
+    const PlanarPose followed = view_in_odom_ ? compose(inverse(camera_in_odom), *view_in_odom_)
+                                              : (any ? hypotheses_.list().front().view_in_camera : PlanarPose());
     report_.histogram = HeadingHistogram(evidence, followed.yaw, params_.vote).votes();
     if (ended() || !any)
     {
@@ -284,7 +283,7 @@ private:
   /** The unit of the structure, from how far odometry says the camera has moved within it. */
   void correctScale(const PlanarPose& camera_in_odom, const PlanarPose& view_in_camera)
   {
-    constexpr double LONGEST = 0.3;   // of the motion compared: near the end, recent motion counts [m]
+    constexpr double LONGEST = 0.3;    // of the motion compared: near the end, recent motion counts [m]
     constexpr double SHORTEST = 0.08;  // [m]
     constexpr double WEIGHT = 0.2;
     constexpr double MAX_CHANGE = 4.0;
@@ -317,8 +316,8 @@ private:
     report_.heading = goal.heading();
     report_.yaw_error = goal.yaw;
     report_.distance = goal.distance();
-    const double half_width = std::clamp(std::atan2(params_.vote.min_half_width, report_.distance),
-                                         params_.vote.min_half_width, M_PI_2);
+    const double half_width =
+        std::clamp(std::atan2(params_.vote.min_half_width, report_.distance), params_.vote.min_half_width, M_PI_2);
     report_.roi_min = report_.heading - half_width;
     report_.roi_max = report_.heading + half_width;
 
@@ -367,8 +366,7 @@ private:
     }
   }
 
-  void giveUpAfter(double stamp, double since, const std::string& failure, HomingState waiting,
-                   const std::string& why)
+  void giveUpAfter(double stamp, double since, const std::string& failure, HomingState waiting, const std::string& why)
   {
     if (stamp - since > params_.lost_timeout)
     {

@@ -81,7 +81,8 @@ std::vector<double> realRoots(const std::array<double, 5>& coefficients)
   Eigen::MatrixXd companion = Eigen::MatrixXd::Zero(degree, degree);
   for (int i = 0; i < degree; ++i)
   {
-    companion(i, degree - 1) = -coefficients[static_cast<std::size_t>(i)] / coefficients[static_cast<std::size_t>(degree)];
+    companion(i, degree - 1) =
+        -coefficients[static_cast<std::size_t>(i)] / coefficients[static_cast<std::size_t>(degree)];
     if (i > 0)
     {
       companion(i, i - 1) = 1.0;
@@ -325,8 +326,8 @@ Eigen::Matrix3d essentialMatrix(const PlanarPose& reference_in_current)
 {
   const double distance = reference_in_current.distance();
   return distance > 0.0 ? Eigen::Matrix3d(crossMatrix(levelTranslation(reference_in_current) / distance) *
-                                          levelRotation(reference_in_current.yaw)) :
-                          Eigen::Matrix3d::Zero();
+                                          levelRotation(reference_in_current.yaw))
+                        : Eigen::Matrix3d::Zero();
 }
 
 std::vector<PlanarPose> planarMotionFromTwoPoints(const Correspondence& first, const Correspondence& second)
@@ -366,7 +367,8 @@ InverseDepth inverseDepth(const Correspondence& pair, const PlanarPose& referenc
   return inverseDepth(pair, levelRotation(reference_in_current.yaw), levelTranslation(reference_in_current));
 }
 
-InverseDepth inverseDepth(const Correspondence& pair, const Eigen::Matrix3d& rotation, const Eigen::Vector3d& translation)
+InverseDepth inverseDepth(const Correspondence& pair, const Eigen::Matrix3d& rotation,
+                          const Eigen::Vector3d& translation)
 {
   // x_cur ~ R x_ref + rho t: linear in rho.
   const Eigen::Vector3d ray = rotation * pair.reference.homogeneous();
@@ -381,7 +383,8 @@ InverseDepth inverseDepth(const Correspondence& pair, const Eigen::Matrix3d& rot
   const double rho = -a.dot(b) / squared;
   const double depth_ratio = ray.z() + rho * t.z();  // of the point in the current camera to that in the reference
   // Behind the current camera, or at infinity in the reference: no depth that the point can have.
-  return depth_ratio > 0.0 ? InverseDepth{ rho, squared / (depth_ratio * depth_ratio) } : InverseDepth{ -std::abs(rho), 0.0 };
+  return depth_ratio > 0.0 ? InverseDepth{ rho, squared / (depth_ratio * depth_ratio) }
+                           : InverseDepth{ -std::abs(rho), 0.0 };
 }
 
 Eigen::Vector2d project(const Landmark& landmark, const PlanarPose& reference_in_current)

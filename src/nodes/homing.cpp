@@ -1,11 +1,11 @@
 // Copyright (c) 2026, the view_servo authors
 // SPDX-License-Identifier: BSD-3-Clause
+#include "view_servo/control/homing.h"
 #include "view_servo/Heading.h"
 #include "view_servo/HomeToViewAction.h"
 #include "view_servo/LineMatches.h"
 #include "view_servo/PointMatches.h"
 #include "view_servo/SetView.h"
-#include "view_servo/control/homing.h"
 #include "view_servo/control/homing_parameters.h"
 #include "view_servo/control/input_watch.h"
 #include "view_servo/control/velocity_limiter.h"
@@ -340,8 +340,8 @@ private:
       {
         if (session_)
         {
-          ROS_WARN_STREAM_THROTTLE(5.0, "matches on '" << topic << "' are of view '" << view << "', not of '"
-                                                       << session_->view << "'");
+          ROS_WARN_STREAM_THROTTLE(
+              5.0, "matches on '" << topic << "' are of view '" << view << "', not of '" << session_->view << "'");
         }
         return;
       }
@@ -463,8 +463,8 @@ private:
     const ros::Duration patience(0.5);
     try
     {
-      result.mount = CameraMount(toIsometry(
-          tf_buffer_.lookupTransform(params_.base_frame, camera_frame, ros::Time(0), patience).transform));
+      result.mount = CameraMount(
+          toIsometry(tf_buffer_.lookupTransform(params_.base_frame, camera_frame, ros::Time(0), patience).transform));
     }
     catch (const tf2::TransformException& error)
     {
@@ -773,9 +773,9 @@ private:
       limiter_.stop();
     }
     send(limiter_.next(wanted_, 1.0 / params_.control_rate));
-    const std::uint8_t state = report.state == HomingState::LOST      ? ServoStatus::LOST :
-                               report.state == HomingState::ACQUIRING ? ServoStatus::ACQUIRING :
-                                                                        ServoStatus::SERVOING;
+    const std::uint8_t state = report.state == HomingState::LOST        ? ServoStatus::LOST
+                               : report.state == HomingState::ACQUIRING ? ServoStatus::ACQUIRING
+                                                                        : ServoStatus::SERVOING;
     status_.publish(toStatus(state, report.reason, report));
     const std::optional<Clock::time_point> frame_time = answered();
     if (frame_time)
@@ -840,8 +840,8 @@ private:
 
   ServoStatus idleStatus(const std::string& reason) const
   {
-    return gate_.open() ? makeStatus(ServoStatus::IDLE, reason) :
-                          makeStatus(ServoStatus::DISABLED, "does not drive until ~enable is called");
+    return gate_.open() ? makeStatus(ServoStatus::IDLE, reason)
+                        : makeStatus(ServoStatus::DISABLED, "does not drive until ~enable is called");
   }
 
   void send(const BaseVelocity& velocity)
@@ -915,7 +915,7 @@ private:
   std::optional<Clock::time_point> inputs_missing_since_;
   int zeros_sent_ = 0;
   bool ever_sent_ = false;
-  int cycles_ = 0;  // of images that commands have followed, since the last diagnosis
+  int cycles_ = 0;          // of images that commands have followed, since the last diagnosis
   double cycle_sum_ = 0.0;  // [ms]
   double cycle_max_ = 0.0;
 

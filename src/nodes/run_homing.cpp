@@ -60,8 +60,7 @@ Eigen::Isometry3d parseStart(const sim::World& world, const std::string& text)
 class HomingRun
 {
 public:
-  HomingRun(ros::NodeHandle& nh, const sim::World& world)
-    : nh_(nh), world_(world), home_(nh, "home", true)
+  HomingRun(ros::NodeHandle& nh, const sim::World& world) : nh_(nh), world_(world), home_(nh, "home", true)
   {
     truth_subscriber_ = nh.subscribe("ground_truth", 5, &HomingRun::takeTruth, this);
   }
@@ -144,11 +143,11 @@ private:
     move.request.pose = sim::toPose(base);
     call("nomad_sim/set_pose", move);
     const PlanarPose wanted = toPlanar(base * world_.camera_on_base * planarFromOptical());
-    return waitFor("an image from where the base was put", [&wanted](const geometry_msgs::Pose& before,
-                                                                   const geometry_msgs::Pose& now) {
-      return compose(inverse(wanted), planar(before)).distance() < 1e-3 &&
-             compose(inverse(wanted), planar(now)).distance() < 1e-3;
-    });
+    return waitFor("an image from where the base was put",
+                   [&wanted](const geometry_msgs::Pose& before, const geometry_msgs::Pose& now) {
+                     return compose(inverse(wanted), planar(before)).distance() < 1e-3 &&
+                            compose(inverse(wanted), planar(now)).distance() < 1e-3;
+                   });
   }
 
   /** Optical axes to those of a base that looks along them. */
@@ -172,9 +171,8 @@ private:
   {
     std::unique_lock<std::mutex> lock(mutex_);
     const int first = truths_;
-    const bool reached = arrived_.wait_for(lock, std::chrono::duration<double>(PATIENCE), [&] {
-      return truths_ >= first + 2 && holds(previous_.pose, truth_.pose);
-    });
+    const bool reached = arrived_.wait_for(lock, std::chrono::duration<double>(PATIENCE),
+                                           [&] { return truths_ >= first + 2 && holds(previous_.pose, truth_.pose); });
     if (!reached)
     {
       throw std::runtime_error("waited in vain for " + what);
@@ -228,8 +226,8 @@ int main(int argc, char** argv)
     reader.read("result", result_file);
     reader.read("exit", exit);
     reader.finish();
-    const view_servo::sim::World world = view_servo::sim::findWorld(
-        world_name, ros::package::getPath("view_servo") + "/config/worlds");
+    const view_servo::sim::World world =
+        view_servo::sim::findWorld(world_name, ros::package::getPath("view_servo") + "/config/worlds");
     view_servo::HomingRun run(nh, world);
     success = run.run(view, view_servo::parseStart(world, start), timeout, summary);
   }

@@ -88,8 +88,7 @@ void PlanarPoseEstimator::solve(const std::vector<int>& sample, std::vector<Mode
   const double stretch = std::hypot(solution(0), solution(1));
   if (stretch < MAX_STRETCH && stretch > 1.0 / MAX_STRETCH)
   {
-    models.push_back(
-        { solution(2) / stretch, solution(3) / stretch, std::atan2(solution(1), solution(0)) });
+    models.push_back({ solution(2) / stretch, solution(3) / stretch, std::atan2(solution(1), solution(0)) });
   }
 }
 

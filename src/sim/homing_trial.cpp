@@ -21,11 +21,11 @@ namespace view_servo::sim
 {
 namespace
 {
-constexpr double STEP = 0.005;           // of the base [s]
+constexpr double STEP = 0.005;            // of the base [s]
 constexpr double ODOMETRY_PERIOD = 0.02;  // [s]
-constexpr double CONTROL_PERIOD = 0.05;  // [s]
-constexpr double IMAGE_DELAY = 0.05;     // from the stamp to what homing makes of it [s]
-constexpr double SETTLING = 1.0;         // after homing has ended, until the error is measured [s]
+constexpr double CONTROL_PERIOD = 0.05;   // [s]
+constexpr double IMAGE_DELAY = 0.05;      // from the stamp to what homing makes of it [s]
+constexpr double SETTLING = 1.0;          // after homing has ended, until the error is measured [s]
 
 /** True at each multiple of a period. */
 class Every
@@ -142,8 +142,8 @@ HomingTrials::HomingTrials(const World& world, const HomingTrialParams& params)
   parts_->features.points = parts_->points.params().points;
   parts_->features.segments = parts_->lines.params().segments;
   parts_->features.lines = parts_->lines.params().features;
-  parts_->reference = std::make_unique<PreparedImage>(parts_->camera.capture(nomad.cameraPose()), cv::Rect(),
-                                                      parts_->features);
+  parts_->reference =
+      std::make_unique<PreparedImage>(parts_->camera.capture(nomad.cameraPose()), cv::Rect(), parts_->features);
 }
 
 HomingTrials::~HomingTrials() = default;
@@ -161,8 +161,8 @@ HomingOutcome HomingTrials::run(const PlanarPose& start, const std::function<voi
   parts_->camera.setLight(light);
 
   const Camera camera = withFocalLengthError(world_.camera, conditions.focal_length_error);
-  const std::unique_ptr<Homing> homing = makeHoming(
-      params_.homing, { parts_->reference->grey(), camera, CameraMount(world_.camera_on_base) });
+  const std::unique_ptr<Homing> homing =
+      makeHoming(params_.homing, { parts_->reference->grey(), camera, CameraMount(world_.camera_on_base) });
   VelocityLimiter limiter(params_.limits);
   Every odometry_due(ODOMETRY_PERIOD);
   Every control_due(CONTROL_PERIOD);
@@ -196,8 +196,8 @@ HomingOutcome HomingTrials::run(const PlanarPose& start, const std::function<voi
         const PreparedImage current(image, cv::Rect(), parts_->features);
         if (by_points)
         {
-          matches.push_back(toMatches(parts_->points.match(*parts_->reference, current, GeometryModel::HOMOGRAPHY), time,
-                                      time + params_.matching_time));
+          matches.push_back(toMatches(parts_->points.match(*parts_->reference, current, GeometryModel::HOMOGRAPHY),
+                                      time, time + params_.matching_time));
         }
         if (by_lines)
         {
@@ -263,8 +263,8 @@ PlanarPose randomStart(const World& world, Rng& rng)
     const double direction = uniform(rng, -M_PI / 3.0, M_PI / 3.0);
     const double yaw = uniform(rng, -M_PI / 18.0, M_PI / 18.0);
     const double sense = uniform(rng, 0.0, 1.0) < 0.5 ? 1.0 : -1.0;  // in front of the goal or behind it
-    const PlanarPose start = compose(
-        toPlanar(world.goal), { sense * distance * std::cos(direction), distance * std::sin(direction), yaw });
+    const PlanarPose start =
+        compose(toPlanar(world.goal), { sense * distance * std::cos(direction), distance * std::sin(direction), yaw });
     try
     {
       nomad.setPose(planarPose(start.x, start.y, start.yaw));

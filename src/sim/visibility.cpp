@@ -35,7 +35,7 @@ std::optional<double> firstHit(const World& world, const Eigen::Vector3d& origin
 
 double shareInSight(const World& world, const Eigen::Isometry3d& reference, const Eigen::Isometry3d& current)
 {
-  constexpr int STEP = 24;           // of the pixels tried
+  constexpr int STEP = 24;            // of the pixels tried
   constexpr double CLEARANCE = 1e-3;  // a point does not hide itself [m]
   int seen = 0;
   int seen_again = 0;

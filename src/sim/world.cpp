@@ -521,10 +521,19 @@ World readWorld(const std::string& file)
   }
 }
 
-World findWorld(const std::string& file_or_name, const std::string& directory)
+World findWorld(const std::string& file_or_name, const std::filesystem::path& directory)
 {
-  const bool is_file = file_or_name.find('/') != std::string::npos || file_or_name.find(".yaml") != std::string::npos;
-  return readWorld(is_file ? file_or_name : directory + "/" + file_or_name + ".yaml");
+  if (std::filesystem::exists(file_or_name))
+  {
+    return readWorld(file_or_name);
+  }
+  const std::filesystem::path file = directory / (file_or_name + ".yaml");
+  if (!std::filesystem::exists(file))
+  {
+    throw std::invalid_argument("there is no world '" + file_or_name + "': neither a file nor one in '" +
+                                directory.string() + "'");
+  }
+  return readWorld(file.string());
 }
 
 Eigen::Isometry3d planarPose(double x, double y, double yaw)

@@ -8,6 +8,7 @@
 #include <Eigen/Geometry>
 #include <opencv2/core/mat.hpp>
 
+#include <filesystem>
 #include <map>
 #include <string>
 #include <vector>
@@ -100,8 +101,9 @@ struct World
  */
 World readWorld(const std::string& file);
 
-/** Reads a world by its file, or by the name that a file has in a directory. @throws as readWorld(). */
-World findWorld(const std::string& file_or_name, const std::string& directory);
+/** Reads a world by its file, or by the name that a file has in a directory. @throws std::invalid_argument as
+ * readWorld(), or when there is none. */
+World findWorld(const std::string& file_or_name, const std::filesystem::path& directory);
 
 /** Pose on the floor: position (x, y), turned by yaw about z [rad]. */
 Eigen::Isometry3d planarPose(double x, double y, double yaw);

@@ -5,6 +5,7 @@
  * Re-runs the thesis' experiments on this implementation: `experiments NAME [--out DIR]` writes NAME.csv, and NAME.png
  * beside it, drawn by plot_experiment; `--list` names them. Those that need real images read them from VIEW_SERVO_DATA.
  */
+#include "homing_experiments.h"
 #include "line_ground_truth.h"
 #include "view_servo/features/line_segments.h"
 #include "view_servo/geometry/line_homography.h"
@@ -33,7 +34,8 @@ struct Experiment
 {
   std::string name;
   std::string description;
-  std::function<void(const fs::path& data, std::ostream& csv)> run;
+  bool needs_data;  ///< real images, from VIEW_SERVO_DATA
+  std::function<void(const ExperimentContext& context, std::ostream& csv)> run;
 };
 
 /** The labelled lines of an image that a detected segment lies on: across within 2 px, 3 degrees, half side by side. */
@@ -88,8 +90,9 @@ Verdict judge(const LinePair& pair, const std::vector<int>& reference_labels, co
  * distances of 25, 75 and 125 px, at a fine and a coarse scale; with the thesis' order of end points and by contrast.
  * The thesis judged by eye; here only candidates count whose reference segment is a labelled line.
  */
-void linesTable(const fs::path& data, std::ostream& csv)
+void linesTable(const ExperimentContext& context, std::ostream& csv)
 {
+  const fs::path& data = context.data;
   constexpr double FINE = 1.0;    // [px]
   constexpr double COARSE = 2.0;  // [px]
   std::vector<LinePair> pairs = readBenchmarkPairs(data, { "dunster", "building_viewpoint" });
@@ -160,7 +163,9 @@ void linesTable(const fs::path& data, std::ostream& csv)
 const std::vector<Experiment>& experiments()
 {
   static const std::vector<Experiment> all{
-    { "lines_table", "tables 4.1 and 4.2: line matching by pairs and triplets", linesTable },
+    { "lines_table", "tables 4.1 and 4.2: line matching by pairs and triplets", true, linesTable },
+    { "homing", "chapter 5: homing in simulated rooms, from many starts", false, runHomingExperiment },
+    { "homing_directions", "the heading between real views of a room", true, runDirectionsExperiment },
   };
   return all;
 }
@@ -181,8 +186,12 @@ int main(int argc, char** argv)
   std::string name;
   std::string out = ".";
   bool list = false;
+  ExperimentContext context;
   app.add_option("name", name, "experiment; see --list");
   app.add_option("--out", out, "folder for NAME.csv and NAME.png, made when it does not exist");
+  app.add_flag("--short", context.brief, "a small part of it, to see that it works");
+  app.add_option("--threads", context.threads, "at most so many; 0: as many as there are processors")
+      ->check(CLI::NonNegativeNumber);
   app.add_flag("--list", list, "names the experiments");
   CLI11_PARSE(app, argc, argv);
   if (list)
@@ -201,10 +210,14 @@ int main(int argc, char** argv)
               << std::endl;
     return 2;
   }
-  const auto data = dataFolder();
-  if (!data)
+  if (found->needs_data)
   {
-    return 2;
+    const auto data = dataFolder();
+    if (!data)
+    {
+      return 2;
+    }
+    context.data = *data;
   }
   try
   {
@@ -216,7 +229,7 @@ int main(int argc, char** argv)
     {
       throw std::runtime_error("cannot write " + csv.string());
     }
-    found->run(*data, stream);
+    found->run(context, stream);
     stream.close();
     std::cout << csv.string() << std::endl;
     if (!plot(csv, png))

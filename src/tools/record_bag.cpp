@@ -2,6 +2,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "command_line.h"
 #include "nodes/robot_messages.h"
+#include "package_folder.h"
 #include "sim/nomad.h"
 #include "sim/puma.h"
 #include "sim/renderer.h"
@@ -9,7 +10,6 @@
 #include "view_servo/ros/conversions.h"
 #include "view_servo/views/image_io.h"
 
-#include <ros/package.h>
 #include <rosbag/bag.h>
 #include <sensor_msgs/image_encodings.h>
 #include <tf2_msgs/TFMessage.h>
@@ -50,7 +50,6 @@ enum ExitStatus
   BAD_INPUT = 2
 };
 
-constexpr char PACKAGE[] = "view_servo";
 constexpr char IMAGE_TOPIC[] = "/camera/image_raw";
 constexpr char CAMERA_INFO_TOPIC[] = "/camera/camera_info";
 constexpr char GROUND_TRUTH_TOPIC[] = "/ground_truth";
@@ -369,31 +368,6 @@ bool isDue(int step, double rate)
   return step == 0 || count(step) > count(step - 1);
 }
 
-/** Where the package's files lie: in the source tree, or where they were installed. */
-fs::path packageFolder()
-{
-  const std::string found = ros::package::getPath(PACKAGE);
-  return found.empty()
-             ? fs::read_symlink("/proc/self/exe").parent_path().parent_path().parent_path() / "share" / PACKAGE
-             : fs::path(found);
-}
-
-/** @param name of a file, or of one of the package's worlds. */
-sim::World worldOf(const std::string& name)
-{
-  if (fs::exists(name))
-  {
-    return sim::readWorld(name);
-  }
-  const fs::path folder = packageFolder() / "config" / "worlds";
-  const fs::path file = folder / (name + ".yaml");
-  if (!fs::exists(file))
-  {
-    throw BadInput("there is no world '" + name + "': neither a file nor one in '" + folder.string() + "'");
-  }
-  return sim::readWorld(file.string());
-}
-
 std::string textOf(const std::string& path)
 {
   std::ifstream file(path);
@@ -437,7 +411,7 @@ std::unique_ptr<Robot> makeRobot(const sim::World& world, const Options& options
 void recordSimulation(const std::string& world_name, const std::string& trajectory_name, const std::string& file,
                       const Options& options)
 {
-  sim::World world = worldOf(world_name);
+  sim::World world = sim::findWorld(world_name, packageFolder() / "config" / "worlds");
   world.quality.noise = options.image_noise.value_or(world.quality.noise);
   world.light.gain = options.light_gain.value_or(world.light.gain);
   world.light.offset = options.light_offset.value_or(world.light.offset);

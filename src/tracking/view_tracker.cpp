@@ -74,7 +74,8 @@ public:
   // cv::resize() keeps the corners of the outermost pixels, not their centres.
   cv::Point2f toSmall(const Eigen::Vector2d& pixel) const
   {
-    return { static_cast<float>((pixel.x() + 0.5) * scale_u_ - 0.5), static_cast<float>((pixel.y() + 0.5) * scale_v_ - 0.5) };
+    return { static_cast<float>((pixel.x() + 0.5) * scale_u_ - 0.5),
+             static_cast<float>((pixel.y() + 0.5) * scale_v_ - 0.5) };
   }
   Eigen::Vector2d toFull(const cv::Point2f& point) const
   {

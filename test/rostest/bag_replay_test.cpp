@@ -1,5 +1,6 @@
 // Copyright (c) 2026, the view_servo authors
 // SPDX-License-Identifier: BSD-3-Clause
+#include "child_process.h"
 #include "node_test.h"
 #include "nodes/robot_messages.h"
 #include "support/recorded_bag.h"
@@ -15,9 +16,6 @@
 #include <gtest/gtest.h>
 #include <rosbag/bag.h>
 #include <rosbag/view.h>
-#include <signal.h>
-#include <spawn.h>
-#include <sys/wait.h>
 
 #include <algorithm>
 #include <cstdlib>
@@ -26,8 +24,6 @@
 #include <memory>
 #include <string>
 #include <vector>
-
-extern char** environ;
 
 namespace view_servo
 {
@@ -51,51 +47,6 @@ trajectories:
     - {time: 3, x: 0.1, y: 0, yaw_deg: -5}
 )";
 constexpr double WALL_X = 2.0;  // of the wall [m]
-
-/** A program with all that it starts, in a process group that ends with this object. */
-class Process
-{
-public:
-  explicit Process(std::vector<std::string> command)
-  {
-    std::vector<char*> argv;
-    for (std::string& word : command)
-    {
-      argv.push_back(word.data());
-    }
-    argv.push_back(nullptr);
-    posix_spawnattr_t attributes;
-    posix_spawnattr_init(&attributes);
-    posix_spawnattr_setflags(&attributes, POSIX_SPAWN_SETPGROUP);
-    posix_spawnattr_setpgroup(&attributes, 0);
-    // The player takes what it is typed as commands.
-    posix_spawn_file_actions_t actions;
-    posix_spawn_file_actions_init(&actions);
-    posix_spawn_file_actions_addopen(&actions, 0, "/dev/null", 0, 0);
-    EXPECT_EQ(posix_spawnp(&pid_, argv[0], &actions, &attributes, argv.data(), environ), 0) << command[0];
-    posix_spawn_file_actions_destroy(&actions);
-    posix_spawnattr_destroy(&attributes);
-  }
-
-  ~Process()
-  {
-    if (pid_ > 0)
-    {
-      kill(-pid_, SIGINT);
-      if (!waitUntil([this] { return waitpid(pid_, nullptr, WNOHANG) == pid_; }))
-      {
-        ADD_FAILURE() << "process " << pid_ << " did not end";
-        kill(-pid_, SIGKILL);
-        waitpid(pid_, nullptr, 0);
-      }
-    }
-  }
-  Process(const Process&) = delete;
-  Process& operator=(const Process&) = delete;
-
-private:
-  pid_t pid_ = 0;
-};
 
 /** Where a camera sees the wall: from (y, z) of the world to pixels. */
 Eigen::Matrix3d imageFromWall(const Camera& camera, const Eigen::Isometry3d& pose)
@@ -255,7 +206,7 @@ TEST_F(BagReplayTest, AnswersAgreeWithTheTruth)
   setViews();
   const Recorder<PointMatches> points("point_matches");
   const Recorder<LineMatches> lines("line_matches");
-  const Process bag(player({}));
+  const ChildProcess bag(player({}));
   EXPECT_TRUE(waitUntil([&] { return points.messages().size() >= 5 && lines.messages().size() >= 5; }));
   EXPECT_EQ(restarts(points) + restarts(lines), 0);
   expectTrue(points);
@@ -267,7 +218,7 @@ TEST_F(BagReplayTest, GoesOnWhenTheBagLoops)
   setViews();
   const Recorder<PointMatches> points("point_matches");
   const Recorder<LineMatches> lines("line_matches");
-  const Process bag(player({ "--loop" }));
+  const ChildProcess bag(player({ "--loop" }));
   EXPECT_TRUE(waitUntil([&] { return restarts(points) >= 2 && restarts(lines) >= 2; }))
       << restarts(points) << " and " << restarts(lines) << " restarts";
   expectTrue(points);
@@ -276,7 +227,7 @@ TEST_F(BagReplayTest, GoesOnWhenTheBagLoops)
 
 TEST_F(BagReplayTest, NodesMayStartLate)
 {
-  const Process bag(player({ "--loop" }));
+  const ChildProcess bag(player({ "--loop" }));
   const Recorder<LineMatches> early("line_matches");
   ASSERT_TRUE(waitUntil([&] { return early.last().has_value(); })) << "the bag does not play";
 
@@ -290,8 +241,8 @@ TEST_F(BagReplayTest, NodesMayStartLate)
                                      "camera_info:=camera/camera_info",
                                      topic + ":=late_" + topic };
   };
-  const Process point_matcher(node(POINT_MATCHER_PATH, "point_matcher", "point_matches"));
-  const Process line_matcher(node(LINE_MATCHER_PATH, "line_matcher", "line_matches"));
+  const ChildProcess point_matcher(node(POINT_MATCHER_PATH, "point_matcher", "point_matches"));
+  const ChildProcess line_matcher(node(LINE_MATCHER_PATH, "line_matcher", "line_matches"));
   const Recorder<PointMatches> points("late_point_matches");
   const Recorder<LineMatches> lines("late_line_matches");
   EXPECT_TRUE(waitUntil([&] { return points.messages().size() >= 3 && lines.messages().size() >= 3; }));
@@ -345,7 +296,8 @@ TEST_P(ShippedRunTest, EachImageIsAnsweredTrulyOrRefused)
   const Recorder<PointMatches> points("point_matches");
   const Recorder<LineMatches> lines("line_matches");
   // An image a second; on a busy machine a matcher may leave one out while it searches all scales for a lost view.
-  const Process play(player({ "--wait-for-subscribers", "--topics", "/camera/image_raw", "/camera/camera_info" }, bag));
+  const ChildProcess play(
+      player({ "--wait-for-subscribers", "--topics", "/camera/image_raw", "/camera/camera_info" }, bag));
   for (const Frame& frame : { frames[frames.size() / 2], frames.back() })
   {
     ASSERT_TRUE(waitUntil([&] {

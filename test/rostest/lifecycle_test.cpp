@@ -1,5 +1,6 @@
 // Copyright (c) 2026, the view_servo authors
 // SPDX-License-Identifier: BSD-3-Clause
+#include "child_process.h"
 #include "node_test.h"
 #include "support/temporary_directory.h"
 
@@ -10,11 +11,7 @@
 #include "view_servo/SaveView.h"
 #include "view_servo/SetView.h"
 
-#include <fcntl.h>
 #include <gtest/gtest.h>
-#include <signal.h>
-#include <spawn.h>
-#include <sys/wait.h>
 
 #include <cstdlib>
 #include <fstream>
@@ -23,8 +20,6 @@
 #include <string>
 #include <utility>
 #include <vector>
-
-extern char** environ;
 
 namespace view_servo
 {
@@ -35,77 +30,6 @@ namespace
 const std::string LINE_MATCHER = LINE_MATCHER_PATH;
 const std::string POINT_MATCHER = POINT_MATCHER_PATH;
 const std::string VIEW_STORE = VIEW_STORE_PATH;
-
-/** A node that the test starts and stops. */
-class NodeProcess
-{
-public:
-  /** @param output file that takes what the node prints. */
-  NodeProcess(const std::string& program, std::vector<std::string> arguments, std::filesystem::path output)
-    : output_(std::move(output))
-  {
-    arguments.insert(arguments.begin(), program);
-    std::vector<char*> argv;
-    for (std::string& argument : arguments)
-    {
-      argv.push_back(argument.data());
-    }
-    argv.push_back(nullptr);
-    posix_spawn_file_actions_t actions;
-    posix_spawn_file_actions_init(&actions);
-    posix_spawn_file_actions_addopen(&actions, 1, output_.c_str(), O_WRONLY | O_CREAT | O_TRUNC, 0600);
-    posix_spawn_file_actions_adddup2(&actions, 1, 2);
-    const int error = posix_spawn(&pid_, program.c_str(), &actions, nullptr, argv.data(), environ);
-    posix_spawn_file_actions_destroy(&actions);
-    EXPECT_EQ(error, 0) << program;
-  }
-
-  ~NodeProcess()
-  {
-    if (!exited())
-    {
-      kill(pid_, SIGKILL);
-      waitpid(pid_, nullptr, 0);
-    }
-  }
-  NodeProcess(const NodeProcess&) = delete;
-  NodeProcess& operator=(const NodeProcess&) = delete;
-
-  void interrupt() const
-  {
-    kill(pid_, SIGINT);
-  }
-
-  bool exited()
-  {
-    if (!exit_status_)
-    {
-      int status = 0;
-      if (waitpid(pid_, &status, WNOHANG) == pid_)
-      {
-        exit_status_ = WIFEXITED(status) ? WEXITSTATUS(status) : 128 + WTERMSIG(status);
-      }
-    }
-    return exit_status_.has_value();
-  }
-
-  /** Waits for the end; 128 + the signal when one ended it. */
-  std::optional<int> exitStatus()
-  {
-    waitUntil([&] { return exited(); });
-    return exit_status_;
-  }
-
-  std::string output() const
-  {
-    return { std::istreambuf_iterator<char>(std::ifstream(output_).rdbuf()), {} };
-  }
-
-private:
-  std::filesystem::path output_;
-  pid_t pid_ = 0;
-  std::optional<int> exit_status_;
-};
 
 class LifecycleTest : public ::testing::Test
 {
@@ -131,10 +55,9 @@ protected:
   {
     const std::string name = "stopped_" + topic;
     const cv::Mat picture = makePicture(1);
-    NodeProcess node(program,
-                     { "__name:=" + name, views(), "_rate:=100.0", "image_raw:=camera/image_raw",
-                       "camera_info:=camera/camera_info", topic + ":=" + name + "/" + topic },
-                     output());
+    ChildProcess node({ program, "__name:=" + name, views(), "_rate:=100.0", "image_raw:=camera/image_raw",
+                        "camera_info:=camera/camera_info", topic + ":=" + name + "/" + topic },
+                      output());
     ASSERT_TRUE(waitForService(name + "/match")) << node.output();
     StoredView view;
     view.name = "wall";
@@ -168,7 +91,7 @@ TEST_F(LifecycleTest, ViewsSurviveARestart)
 {
   const cv::Mat picture = makePicture(1);
   {
-    NodeProcess node(VIEW_STORE, { "__name:=view_store_one", views() }, output());
+    ChildProcess node({ VIEW_STORE, "__name:=view_store_one", views() }, output());
     ASSERT_TRUE(waitForService("view_store_one/save")) << node.output();
     SaveView::Request request;
     request.name = "wall";
@@ -180,14 +103,14 @@ TEST_F(LifecycleTest, ViewsSurviveARestart)
     EXPECT_EQ(node.exitStatus(), 0) << node.output();
   }
 
-  NodeProcess node(VIEW_STORE, { "__name:=view_store_two", views() }, output());
+  ChildProcess node({ VIEW_STORE, "__name:=view_store_two", views() }, output());
   ASSERT_TRUE(waitForService("view_store_two/list")) << node.output();
   ListViews::Request list_request;
   ListViews::Response listing;
   ASSERT_TRUE(ros::service::call("view_store_two/list", list_request, listing));
   EXPECT_EQ(listing.names, std::vector<std::string>{ "wall" });
 
-  NodeProcess matcher(POINT_MATCHER, { "__name:=matcher", views() }, directory_.path() / "matcher_output");
+  ChildProcess matcher({ POINT_MATCHER, "__name:=matcher", views() }, directory_.path() / "matcher_output");
   ASSERT_TRUE(waitForService("matcher/match")) << matcher.output();
   MatchPoints::Request request;
   request.reference.view = "wall";
@@ -204,7 +127,7 @@ TEST_F(LifecycleTest, KeepsViewsInRosHomeByDefault)
   const char* before = std::getenv("ROS_HOME");
   const std::optional<std::string> saved = before != nullptr ? std::optional<std::string>(before) : std::nullopt;
   setenv("ROS_HOME", home.c_str(), 1);
-  NodeProcess node(VIEW_STORE, { "__name:=view_store_home" }, output());
+  ChildProcess node({ VIEW_STORE, "__name:=view_store_home" }, output());
   saved ? setenv("ROS_HOME", saved->c_str(), 1) : unsetenv("ROS_HOME");
   ASSERT_TRUE(waitForService("view_store_home/save")) << node.output();
   SaveView::Request request;
@@ -218,10 +141,9 @@ TEST_F(LifecycleTest, KeepsViewsInRosHomeByDefault)
 
 TEST_F(LifecycleTest, RefusesToStartAndListsAllFaults)
 {
-  NodeProcess node(POINT_MATCHER,
-                   { "__name:=faulty", views(), "_rate:=0", "_queue_size:=none", "_max_image_age:=-1",
-                     "_coefficients:=7", "_assignment:=lucky", "_view:=../x" },
-                   output());
+  ChildProcess node({ POINT_MATCHER, "__name:=faulty", views(), "_rate:=0", "_queue_size:=none", "_max_image_age:=-1",
+                      "_coefficients:=7", "_assignment:=lucky", "_view:=../x" },
+                    output());
   EXPECT_EQ(node.exitStatus(), 1);
   for (const char* name : { "~rate", "~queue_size", "~max_image_age", "coefficients", "~assignment", "~view" })
   {
@@ -231,10 +153,10 @@ TEST_F(LifecycleTest, RefusesToStartAndListsAllFaults)
 
 TEST_F(LifecycleTest, LineMatcherRefusesToStartAndListsAllFaults)
 {
-  NodeProcess node(LINE_MATCHER,
-                   { "__name:=faulty_lines", views(), "_rate:=0", "_queue_size:=none", "_max_image_age:=-1",
-                     "_segment_min_length:=0", "_detector:=lucky", "_min_plane_lines:=2", "_view:=../x" },
-                   output());
+  ChildProcess node(
+      { LINE_MATCHER, "__name:=faulty_lines", views(), "_rate:=0", "_queue_size:=none", "_max_image_age:=-1",
+        "_segment_min_length:=0", "_detector:=lucky", "_min_plane_lines:=2", "_view:=../x" },
+      output());
   EXPECT_EQ(node.exitStatus(), 1);
   for (const char* name :
        { "~rate", "~queue_size", "~max_image_age", "segment_min_length", "~detector", "min_plane_lines", "~view" })
@@ -245,7 +167,7 @@ TEST_F(LifecycleTest, LineMatcherRefusesToStartAndListsAllFaults)
 
 TEST_F(LifecycleTest, WarnsOfMisspeltParameters)
 {
-  NodeProcess node(POINT_MATCHER, { "__name:=misspelt", views(), "_max_cornes:=300", "_rte:=3.0" }, output());
+  ChildProcess node({ POINT_MATCHER, "__name:=misspelt", views(), "_max_cornes:=300", "_rte:=3.0" }, output());
   ASSERT_TRUE(waitForService("misspelt/match")) << node.output();
   EXPECT_TRUE(contains(node.output(), "~max_cornes")) << node.output();
   EXPECT_TRUE(contains(node.output(), "~max_corners?")) << node.output();
@@ -254,10 +176,9 @@ TEST_F(LifecycleTest, WarnsOfMisspeltParameters)
 
 TEST_F(LifecycleTest, ReadsItsParameters)
 {
-  NodeProcess node(POINT_MATCHER,
-                   { "__name:=tuned", views(), "_max_corners:=300", "_seed:=7", "_cyclic_order:=false",
-                     "_view_consistency:=off", "_min_significance:=8" },
-                   output());
+  ChildProcess node({ POINT_MATCHER, "__name:=tuned", views(), "_max_corners:=300", "_seed:=7", "_cyclic_order:=false",
+                      "_view_consistency:=off", "_min_significance:=8" },
+                    output());
   ASSERT_TRUE(waitForService("tuned/match")) << node.output();
   for (const char* value : { "max_corners=300", "seed=7", "cyclic_order=false", "view_consistency=off",
                              "min_significance=8", "rate=5", "coefficients=8" })
@@ -269,10 +190,9 @@ TEST_F(LifecycleTest, ReadsItsParameters)
 
 TEST_F(LifecycleTest, LineMatcherReadsItsParameters)
 {
-  NodeProcess node(LINE_MATCHER,
-                   { "__name:=tuned_lines", views(), "_max_segments:=300", "_seed:=7", "_line_order:=upright",
-                     "_min_quality:=0.25", "_max_segmens:=3" },
-                   output());
+  ChildProcess node({ LINE_MATCHER, "__name:=tuned_lines", views(), "_max_segments:=300", "_seed:=7",
+                      "_line_order:=upright", "_min_quality:=0.25", "_max_segmens:=3" },
+                    output());
   ASSERT_TRUE(waitForService("tuned_lines/match")) << node.output();
   for (const char* value :
        { "max_segments=300", "seed=7", "line_order=upright", "min_quality=0.25", "rate=10", "max_planes=4" })

@@ -22,7 +22,7 @@ double gradientSimilarity(const cv::Mat& reference, const cv::Mat& current);
 /** Options of the arrival detector. */
 struct ArrivalDetectorParams
 {
-  double rise = 1.0;      ///< of a step's rise that is sudden: times the standard deviation of what went before, > 0
+  double rise = 1.0;       ///< of a step's rise that is sudden: times the standard deviation of what went before, > 0
   double min_rise = 0.08;  ///< ... and at least this much, > 0
   double drop = 0.1;       ///< part of the gain since the approach that is lost again once the view was passed, (0, 1)
   int min_history = 5;     ///< similarities before any rise counts, >= 2

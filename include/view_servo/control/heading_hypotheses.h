@@ -15,12 +15,12 @@ namespace view_servo
 /** Options of the hypotheses of where the stored view is. */
 struct HeadingHypothesesParams
 {
-  double inlier_threshold = 3.0;   ///< largest error of a match that supports one [px], > 0
-  double max_yaw = 0.6;            ///< largest turn between the views that is looked for [rad], (0, pi/2)
-  double min_significance = 6.0;   ///< -log10 of the number of false alarms that one may have at first, >= 0
-  double memory = 0.7;             ///< part of its weight that one keeps from matches to matches, [0, 1)
-  int max_hypotheses = 5;          ///< kept, those with most weight, >= 1
-  double assumed_distance = 1.0;   ///< to the view until it is known [m], > 0
+  double inlier_threshold = 3.0;  ///< largest error of a match that supports one [px], > 0
+  double max_yaw = 0.6;           ///< largest turn between the views that is looked for [rad], (0, pi/2)
+  double min_significance = 6.0;  ///< -log10 of the number of false alarms that one may have at first, >= 0
+  double memory = 0.7;            ///< part of its weight that one keeps from matches to matches, [0, 1)
+  int max_hypotheses = 5;         ///< kept, those with most weight, >= 1
+  double assumed_distance = 1.0;  ///< to the view until it is known [m], > 0
   std::uint64_t seed = 1;
 
   /** All faults, one a line; empty when the parameters are usable. */
@@ -30,11 +30,11 @@ struct HeadingHypothesesParams
 /** A place where the stored view may have been taken. */
 struct HeadingHypothesis
 {
-  PlanarPose view_in_odom;   ///< of its level camera; the direction from the last camera pose is known, the distance not
-  PlanarPose view_in_camera; ///< as seen from the last camera pose, of distance 1
-  double weight = 0.0;       ///< share of the matches that agree, faded over those before, at most 1 / (1 - memory)
-  int updates = 0;           ///< sets of matches that agreed
-  Correspondences support;   ///< last matches that agree
+  PlanarPose view_in_odom;  ///< of its level camera; the direction from the last camera pose is known, the distance not
+  PlanarPose view_in_camera;  ///< as seen from the last camera pose, of distance 1
+  double weight = 0.0;        ///< share of the matches that agree, faded over those before, at most 1 / (1 - memory)
+  int updates = 0;            ///< sets of matches that agreed
+  Correspondences support;    ///< last matches that agree
 };
 
 /**

@@ -73,16 +73,16 @@ struct HomingReport
 {
   double stamp = 0.0;  ///< of the image
   HomingState state = HomingState::ACQUIRING;
-  std::string reason;                               ///< of the state, in one line
-  bool at_view = false;                             ///< within arrival_distance and arrival_yaw
+  std::string reason;                                         ///< of the state, in one line
+  bool at_view = false;                                       ///< within arrival_distance and arrival_yaw
   double heading = std::numeric_limits<double>::quiet_NaN();  ///< direction to the view's base pose, in base_link [rad]
   double yaw_error = std::numeric_limits<double>::quiet_NaN();  ///< that the base has yet to turn by [rad]
   double distance = std::numeric_limits<double>::quiet_NaN();   ///< left to drive [m]
-  double confidence = 0.0;  ///< share of the matches or points that agree, [0, 1]
+  double confidence = 0.0;                                      ///< share of the matches or points that agree, [0, 1]
   std::vector<double> histogram;
   double roi_min = std::numeric_limits<double>::quiet_NaN();  ///< [rad]
   double roi_max = std::numeric_limits<double>::quiet_NaN();
-  double similarity = std::numeric_limits<double>::quiet_NaN();  ///< gradient correlation, -1..1
+  double similarity = std::numeric_limits<double>::quiet_NaN();    ///< gradient correlation, -1..1
   double displacement = std::numeric_limits<double>::quiet_NaN();  ///< median, of the view's points [px]
   int inliers = 0;
 };

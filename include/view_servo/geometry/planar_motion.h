@@ -93,7 +93,8 @@ struct InverseDepth
 };
 InverseDepth inverseDepth(const Correspondence& pair, const PlanarPose& reference_in_current);
 /** The same of any motion X_cur = R X_ref + t. */
-InverseDepth inverseDepth(const Correspondence& pair, const Eigen::Matrix3d& rotation, const Eigen::Vector3d& translation);
+InverseDepth inverseDepth(const Correspondence& pair, const Eigen::Matrix3d& rotation,
+                          const Eigen::Vector3d& translation);
 
 /** A point of the reference view with its depth. */
 struct Landmark

@@ -18,13 +18,14 @@ namespace view_servo
 /** Options of the view tracker. */
 struct ViewTrackerParams
 {
-  int max_landmarks = 200;     ///< points of the stored view that are tracked, >= 8
-  int window = 21;             ///< side of the patches [px], odd, >= 5
-  int levels = 2;              ///< of the pyramid besides the image, >= 0
-  double max_residual = 2.0;   ///< of a point that supports the pose [px], > 0
-  int min_supporting = 15;     ///< points that make a pose, >= 4
-  double min_support = 0.35;   ///< part of the points looked for that makes one, (0, 1]
-  double max_scale_difference = 0.35;  ///< between a point's change of size and the typical one; others are left out, > 0
+  int max_landmarks = 200;    ///< points of the stored view that are tracked, >= 8
+  int window = 21;            ///< side of the patches [px], odd, >= 5
+  int levels = 2;             ///< of the pyramid besides the image, >= 0
+  double max_residual = 2.0;  ///< of a point that supports the pose [px], > 0
+  int min_supporting = 15;    ///< points that make a pose, >= 4
+  double min_support = 0.35;  ///< part of the points looked for that makes one, (0, 1]
+  double max_scale_difference =
+      0.35;                    ///< between a point's change of size and the typical one; others are left out, > 0
   double assumed_depth = 2.5;  ///< of points when nothing is known [m], > 0
 
   /** All faults, one a line; empty when the parameters are usable. */
@@ -45,7 +46,8 @@ class ViewTracker
 {
 public:
   /** @param reference 8-bit, one channel. The parameters must be valid. */
-  ViewTracker(const cv::Mat& reference, const Camera& camera, const CameraMount& mount, const ViewTrackerParams& params);
+  ViewTracker(const cv::Mat& reference, const Camera& camera, const CameraMount& mount,
+              const ViewTrackerParams& params);
 
   bool hasStructure() const
   {
@@ -92,7 +94,7 @@ private:
   struct Point
   {
     Landmark landmark;
-    double information;  ///< of the inverse depth
+    double information;     ///< of the inverse depth
     Eigen::Vector2d pixel;  ///< in the stored view
   };
 

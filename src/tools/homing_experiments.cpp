@@ -1,0 +1,199 @@
+// Copyright (c) 2026, the view_servo authors
+// SPDX-License-Identifier: BSD-3-Clause
+#include "homing_experiments.h"
+
+#include "package_folder.h"
+#include "sim/homing_trial.h"
+#include "view_servo/control/heading_hypotheses.h"
+#include "view_servo/geometry/camera.h"
+#include "view_servo/robust/random.h"
+#include "view_servo/views/image_io.h"
+#include "view_servo/views/line_view_matcher.h"
+#include "view_servo/views/prepared_image.h"
+#include "view_servo/views/view_matcher.h"
+
+#include <Eigen/Geometry>
+#include <Eigen/LU>
+
+#include <algorithm>
+#include <array>
+#include <atomic>
+#include <cmath>
+#include <fstream>
+#include <functional>
+#include <iostream>
+#include <map>
+#include <memory>
+#include <mutex>
+#include <sstream>
+#include <stdexcept>
+#include <string>
+#include <thread>
+#include <vector>
+
+namespace view_servo
+{
+namespace
+{
+namespace fs = std::filesystem;
+
+constexpr double DEGREES = 180.0 / M_PI;
+
+/** One run of homing. */
+struct Run
+{
+  std::string world;
+  HomingMode mode;
+  bool hard;
+  int index;
+  PlanarPose start;
+};
+
+sim::HomingTrialParams paramsOf(const Run& run)
+{
+  sim::HomingTrialParams params;
+  params.seed = static_cast<std::uint64_t>(run.index) + 1;
+  if (run.hard)
+  {
+    params.conditions.image_noise = 5.0;
+    params.conditions.odometry_drift = 0.05;
+    params.conditions.light_gain = 0.7;
+    params.conditions.focal_length_error = 0.02;
+    params.conditions.occluded_from = 3.0;
+  }
+  if (run.mode == HomingMode::THESIS)
+  {
+    params.homing.mode = HomingMode::THESIS;
+    params.use_points = false;
+    params.line_pairs = true;
+    params.lines_period = 0.1;
+    params.max_duration = 200.0;
+  }
+  return params;
+}
+
+std::string toRow(const Run& run, const sim::HomingOutcome& outcome)
+{
+  std::string reason = outcome.reason;
+  std::replace(reason.begin(), reason.end(), ',', ';');
+  std::ostringstream row;
+  row << run.world << ',' << (run.mode == HomingMode::THESIS ? "thesis" : "servo") << ','
+      << (run.hard ? "hard" : "plain") << ',' << run.index << ',' << run.start.x << ',' << run.start.y << ','
+      << run.start.yaw * DEGREES << ',' << (outcome.arrived ? 1 : 0) << ',' << 1e3 * outcome.distance_error << ','
+      << 1e3 * outcome.ahead_error << ',' << 1e3 * outcome.side_error << ',' << outcome.yaw_error * DEGREES << ','
+      << outcome.duration << ',' << outcome.travelled << ',' << reason << '\n';
+  return row.str();
+}
+
+std::vector<Run> allRuns(const std::map<std::string, sim::World>& worlds, bool brief)
+{
+  constexpr std::uint64_t SEED = 5;
+  const int starts = brief ? 3 : 100;
+  std::vector<Run> runs;
+  for (const char* name : { "desk", "cabinet" })
+  {
+    const PlanarPose start = brief ? PlanarPose{ -0.1, 0.05, 0.0 } : toPlanar(worlds.at(name).start("thesis"));
+    runs.push_back({ name, HomingMode::THESIS, false, 0, start });
+    runs.push_back({ name, HomingMode::SERVO, false, 0, start });
+  }
+  Rng rng(SEED);
+  const std::array<const char*, 3> names = { "desk", "cabinet", "corridor" };
+  for (int i = 0; i < starts; ++i)
+  {
+    const std::string name = names[static_cast<std::size_t>(i) % names.size()];
+    const PlanarPose start = sim::randomStart(worlds.at(name), rng);
+    for (const bool hard : { false, true })
+    {
+      runs.push_back({ name, HomingMode::SERVO, hard, i + 1, start });
+    }
+  }
+  return runs;
+}
+
+/** Calls `work(i)` for all i below `count`, on several threads. An exception ends all and is passed on. */
+void inParallel(std::size_t count, int max_threads, const std::function<void(std::size_t)>& work)
+{
+  const unsigned int wanted =
+      max_threads > 0 ? static_cast<unsigned int>(max_threads) : std::max(1U, std::thread::hardware_concurrency());
+  std::atomic<std::size_t> next{ 0 };
+  std::exception_ptr failure;
+  std::mutex mutex;
+  std::vector<std::thread> threads;
+  for (unsigned int k = 0; k < wanted; ++k)
+  {
+    threads.emplace_back([&] {
+      try
+      {
+        for (std::size_t i = next++; i < count; i = next++)
+        {
+          work(i);
+        }
+      }
+      catch (...)
+      {
+        const std::lock_guard<std::mutex> lock(mutex);
+        failure = std::current_exception();
+        next = count;
+      }
+    });
+  }
+  for (std::thread& thread : threads)
+  {
+    thread.join();
+  }
+  if (failure)
+  {
+    std::rethrow_exception(failure);
+  }
+}
+
+}  // namespace
+
+void runHomingExperiment(const ExperimentContext& context, std::ostream& csv)
+{
+  constexpr double NEAR_ENOUGH = 0.02;            // [m]
+  constexpr double STRAIGHT_ENOUGH = M_PI / 180;  // [rad]
+  std::map<std::string, sim::World> worlds;
+  for (const char* name : { "desk", "cabinet", "corridor" })
+  {
+    worlds.emplace(name, sim::findWorld(name, packageFolder() / "config" / "worlds"));
+  }
+  const std::vector<Run> runs = allRuns(worlds, context.brief);
+  std::vector<std::string> rows(runs.size());
+  std::map<std::string, std::pair<int, int>> counts;  // of conditions: near enough, all
+  std::mutex mutex;
+  std::size_t done = 0;
+  inParallel(runs.size(), context.threads, [&](std::size_t i) {
+    sim::HomingTrials trials(worlds.at(runs[i].world), paramsOf(runs[i]));
+    const sim::HomingOutcome outcome = trials.run(runs[i].start);
+    const std::lock_guard<std::mutex> lock(mutex);
+    rows[i] = toRow(runs[i], outcome);
+    std::cerr << ++done << " of " << runs.size() << ": " << rows[i] << std::flush;
+    if (runs[i].index > 0)
+    {
+      auto& [good, all] = counts[runs[i].hard ? "hard" : "plain"];
+      good +=
+          outcome.arrived && outcome.distance_error <= NEAR_ENOUGH && std::abs(outcome.yaw_error) <= STRAIGHT_ENOUGH;
+      ++all;
+    }
+  });
+  csv << "world,mode,conditions,index,start_x,start_y,start_yaw_deg,arrived,distance_error_mm,ahead_mm,side_mm,"
+         "yaw_error_deg,duration_s,travelled_m,reason\n";
+  for (const std::string& row : rows)
+  {
+    csv << row;
+  }
+  for (const auto& [conditions, count] : counts)
+  {
+    std::cout << conditions << ": " << count.first << " of " << count.second
+              << " random starts end within 2 cm and 1 degree" << std::endl;
+  }
+}
+
+void runDirectionsExperiment(const ExperimentContext& context, std::ostream& csv)
+{
+  (void)context;
+  (void)csv;
+}
+
+}  // namespace view_servo
