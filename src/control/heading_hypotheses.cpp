@@ -6,6 +6,7 @@
 #include "view_servo/geometry/fundamental.h"
 #include "view_servo/robust/planar_motion_estimator.h"
 #include "view_servo/robust/ransac.h"
+#include "view_servo/robust/relative_pose_estimator.h"
 #include "view_servo/robust/significance.h"
 
 #include <algorithm>
@@ -22,18 +23,32 @@ constexpr double LEAST_PART = 0.05;    // of the largest weight, below which a h
 constexpr double EPIPOLAR_BAND = 1.2;  // typical length of an epipolar line in an image, in units of level points
 constexpr double IMAGE_AREA = 1.1;     // of level points, of an ordinary lens
 
-Correspondences agreeing(const Correspondences& matches, const PlanarMotion& motion, double threshold, bool wanted)
+Correspondences agreeing(const Correspondences& matches, const RelativePose& motion, double threshold, bool wanted)
 {
-  const PlanarMotionEstimator estimator(matches, M_PI);
+  const RelativePoseEstimator estimator(matches);
+  const RelativePoseEstimator::Model model{ motion, motion.essential() };
   Correspondences result;
   for (std::size_t i = 0; i < matches.size(); ++i)
   {
-    if ((estimator.error(motion, i) <= threshold * threshold) == wanted)
+    if ((estimator.error(model, i) <= threshold * threshold) == wanted)
     {
       result.push_back(matches[i]);
     }
   }
   return result;
+}
+
+RelativePose toRelative(const PlanarPose& pose)
+{
+  return { levelRotation(pose.yaw), levelTranslation(pose).normalized() };
+}
+
+/** The part on the floor: heading and yaw, distance 1. */
+PlanarPose toPlanar(const RelativePose& motion)
+{
+  const Eigen::Vector3d ahead = motion.rotation.col(2);
+  const double heading = std::atan2(-motion.translation.x(), motion.translation.z());
+  return { std::cos(heading), std::sin(heading), std::atan2(-ahead.x(), ahead.z()) };
 }
 
 bool same(const PlanarPose& a, const PlanarPose& b)
@@ -71,40 +86,72 @@ void HeadingHypotheses::update(const Correspondences& matches, const PlanarPose&
   Correspondences left = matches;
   for (int i = 0; i < SUGGESTIONS; ++i)
   {
-    RansacParams ransac_params;
-    ransac_params.inlier_threshold = threshold_;
-    ransac_params.sampling = Sampling::UNIFORM;
-    const auto found = ransac(PlanarMotionEstimator(left, params_.max_yaw), ransac_params, rng_);
-    if (!found.model)
+    const std::optional<RelativePose> motion = suggest(left);
+    if (!motion)
     {
       break;
     }
-    const Correspondences support = select(left, found.inliers);
-    const double by_area = 2.0 * threshold_ * EPIPOLAR_BAND / IMAGE_AREA;
-    const double among = chanceAmong(support.size(), [&](std::size_t reference, std::size_t current) {
-      return sampsonError(found.model->essential, { support[reference].reference, support[current].current }) <=
-             threshold_ * threshold_;
-    });
-    if (logSignificance(left.size(), support.size(), PlanarMotionEstimator::SAMPLE_SIZE, std::max(by_area, among)) <
-        params_.min_significance)
-    {
-      break;
-    }
-    const PlanarPose& motion = found.model->pose;
+    const PlanarPose planar = toPlanar(*motion);
     const bool known =
         std::any_of(hypotheses_.begin(), hypotheses_.end(),
-                    [&motion](const HeadingHypothesis& hypothesis) { return same(hypothesis.view_in_camera, motion); });
+                    [&planar](const HeadingHypothesis& hypothesis) { return same(hypothesis.view_in_camera, planar); });
     if (!known)
     {
       HeadingHypothesis hypothesis;
-      const PlanarPose guess{ params_.assumed_distance * motion.x, params_.assumed_distance * motion.y, motion.yaw };
-      hypothesis.view_in_odom = compose(camera_in_odom, guess);
+      hypothesis.motion = *motion;
+      hypothesis.view_in_odom = compose(
+          camera_in_odom, { params_.assumed_distance * planar.x, params_.assumed_distance * planar.y, planar.yaw });
       confirm(hypothesis, matches, camera_in_odom);
       hypotheses_.push_back(hypothesis);
     }
-    left = agreeing(left, *found.model, threshold_, false);
+    left = agreeing(left, *motion, threshold_, false);
   }
+  keepTheBest();
+}
 
+std::optional<RelativePose> HeadingHypotheses::suggest(const Correspondences& matches)
+{
+  RansacParams ransac_params;
+  ransac_params.inlier_threshold = threshold_;
+  ransac_params.sampling = Sampling::UNIFORM;
+  std::optional<RelativePose> motion;
+  int sample_size = 0;
+  if (params_.motion == CameraMotion::PLANAR)
+  {
+    const auto found = ransac(PlanarMotionEstimator(matches, params_.max_yaw), ransac_params, rng_);
+    motion = found.model ? std::optional<RelativePose>(toRelative(found.model->pose)) : std::nullopt;
+    sample_size = PlanarMotionEstimator::SAMPLE_SIZE;
+  }
+  else
+  {
+    const auto found = ransac(RelativePoseEstimator(matches), ransac_params, rng_);
+    motion = found.model ? std::optional<RelativePose>(found.model->pose) : std::nullopt;
+    sample_size = RelativePoseEstimator::SAMPLE_SIZE;
+  }
+  if (!motion)
+  {
+    return std::nullopt;
+  }
+  const Correspondences support = agreeing(matches, *motion, threshold_, true);
+  const Eigen::Matrix3d essential = motion->essential();
+  const double by_area = 2.0 * threshold_ * EPIPOLAR_BAND / IMAGE_AREA;
+  const double among = chanceAmong(support.size(), [&](std::size_t reference, std::size_t current) {
+    return sampsonError(essential, { support[reference].reference, support[current].current }) <=
+           threshold_ * threshold_;
+  });
+  const double significance =
+      logSignificance(matches.size(), support.size(), sample_size, std::max(by_area, among));
+  return significance >= params_.min_significance ? motion : std::nullopt;
+}
+
+RelativePose HeadingHypotheses::refine(const RelativePose& motion, const Correspondences& support) const
+{
+  return params_.motion == CameraMotion::PLANAR ? toRelative(refinePlanarMotion(toPlanar(motion), support)) :
+                                                  refineRelativePose(motion, support);
+}
+
+void HeadingHypotheses::keepTheBest()
+{
   std::stable_sort(hypotheses_.begin(), hypotheses_.end(),
                    [](const HeadingHypothesis& a, const HeadingHypothesis& b) { return a.weight > b.weight; });
   for (std::size_t i = 0; i < hypotheses_.size();)
@@ -134,24 +181,27 @@ void HeadingHypotheses::confirm(HeadingHypothesis& hypothesis, const Corresponde
   constexpr double CLOSEST = 0.05;  // the least distance that a hypothesis keeps [m]
   const PlanarPose predicted = compose(inverse(camera_in_odom), hypothesis.view_in_odom);
   const double distance = std::max(predicted.distance(), CLOSEST);
-  PlanarMotion motion({ std::cos(predicted.heading()), std::sin(predicted.heading()), predicted.yaw });
+  const PlanarPose direction{ std::cos(predicted.heading()), std::sin(predicted.heading()), predicted.yaw };
+  // What tilts a free camera is not foreseen by odometry.
+  RelativePose motion = params_.motion == CameraMotion::PLANAR ? toRelative(direction) : hypothesis.motion;
   for (const double width : { WIDE, 1.0 })
   {
     const Correspondences support = agreeing(matches, motion, width * threshold_, true);
-    if (support.size() > static_cast<std::size_t>(PlanarMotionEstimator::SAMPLE_SIZE))
+    if (support.size() > static_cast<std::size_t>(RelativePoseEstimator::SAMPLE_SIZE))
     {
-      motion = PlanarMotion(refinePlanarMotion(motion.pose, support));
+      motion = refine(motion, support);
     }
   }
   Correspondences support = agreeing(matches, motion, threshold_, true);
   if (matches.empty() || static_cast<double>(support.size()) < LEAST_PART * static_cast<double>(matches.size()))
   {
-    hypothesis.view_in_camera = { std::cos(predicted.heading()), std::sin(predicted.heading()), predicted.yaw };
+    hypothesis.view_in_camera = direction;
     return;
   }
-  hypothesis.view_in_camera = motion.pose;
-  hypothesis.view_in_odom =
-      compose(camera_in_odom, { distance * motion.pose.x, distance * motion.pose.y, motion.pose.yaw });
+  const PlanarPose planar = toPlanar(motion);
+  hypothesis.motion = motion;
+  hypothesis.view_in_camera = planar;
+  hypothesis.view_in_odom = compose(camera_in_odom, { distance * planar.x, distance * planar.y, planar.yaw });
   hypothesis.weight += static_cast<double>(support.size()) / static_cast<double>(matches.size());
   hypothesis.support = std::move(support);
   ++hypothesis.updates;

@@ -176,7 +176,7 @@ protected:
     {
       checkStructure(best, evidence.pairs, camera_in_odom);
     }
-    if (!tracker_.hasStructure())
+    if (!tracker_.hasStructure() && params_.hypotheses.motion == CameraMotion::PLANAR)
     {
       const PlanarPose unit = best.view_in_camera;
       const double distance = compose(inverse(camera_in_odom), best.view_in_odom).distance();
@@ -306,7 +306,8 @@ private:
   /** State, arrival and loss after an image. */
   void judge(double stamp, const PlanarPose& base)
   {
-    constexpr double COAST = 0.5;  // matches are older than the image when they come [s]
+    constexpr double POSITION_DOUBT = 0.05;  // of where the view is, for the region of interest [m]
+    constexpr double COAST = 0.5;            // matches are older than the image when they come [s]
     if (!view_in_odom_)
     {
       giveUpAfter(stamp, started_, "the view was not found", HomingState::ACQUIRING, "looking for the view");
@@ -317,7 +318,7 @@ private:
     report_.yaw_error = goal.yaw;
     report_.distance = goal.distance();
     const double half_width =
-        std::clamp(std::atan2(params_.vote.min_half_width, report_.distance), params_.vote.min_half_width, M_PI_2);
+        std::clamp(std::atan2(POSITION_DOUBT, report_.distance), params_.vote.min_half_width, M_PI_2);
     report_.roi_min = report_.heading - half_width;
     report_.roi_max = report_.heading + half_width;
 

@@ -4,6 +4,7 @@
 
 #include "levenberg_marquardt.h"
 #include "residuals.h"
+#include "view_servo/geometry/essential.h"
 #include "view_servo/geometry/fundamental.h"
 
 #include <Eigen/Eigenvalues>
@@ -25,13 +26,6 @@ Eigen::Matrix3d levelRotationDerivative(double yaw)
   Eigen::Matrix3d d;
   d << -std::sin(yaw), 0.0, -std::cos(yaw), 0.0, 0.0, 0.0, std::cos(yaw), 0.0, -std::sin(yaw);
   return d;
-}
-
-Eigen::Matrix3d crossMatrix(const Eigen::Vector3d& v)
-{
-  Eigen::Matrix3d m;
-  m << 0.0, -v.z(), v.y(), v.z(), 0.0, -v.x(), -v.y(), v.x(), 0.0;
-  return m;
 }
 
 PlanarPose unitPose(double heading, double yaw)

@@ -3,6 +3,7 @@
 #pragma once
 
 #include "view_servo/geometry/correspondence.h"
+#include "view_servo/geometry/essential.h"
 
 #include "normalization.h"
 
@@ -140,8 +141,7 @@ struct Orthonormal
     for (int k = 0; k < 3; ++k)
     {
       const Eigen::Vector3d e = Eigen::Vector3d::Unit(k);
-      Eigen::Matrix3d cross;
-      cross << 0.0, -e.z(), e.y(), e.z(), 0.0, -e.x(), -e.y(), e.x(), 0.0;
+      const Eigen::Matrix3d cross = crossMatrix(e);
       set(k, u * cross * s * v.transpose());
       set(3 + k, u * s * cross.transpose() * v.transpose());
     }

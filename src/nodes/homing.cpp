@@ -17,6 +17,7 @@
 #include "view_servo/views/view_store.h"
 
 #include <actionlib/server/simple_action_server.h>
+#include <geometry_msgs/PoseStamped.h>
 #include <geometry_msgs/Twist.h>
 #include <geometry_msgs/TwistStamped.h>
 #include <nav_msgs/Odometry.h>
@@ -185,7 +186,8 @@ struct Session
  * Publishes:
  *  - `cmd_vel` (geometry_msgs/Twist, in base_link) and `cmd_vel_stamped`, or `cmd_vel_dry` and `cmd_vel_dry_stamped`; zero
  *    for a while after each end, then nothing;
- *  - `heading` (view_servo/Heading): for each image;
+ *  - `heading` (view_servo/Heading): for each image; `heading_arrow` (geometry_msgs/PoseStamped): the same for rviz, at
+ *    the base, its x axis towards the view, while there is a heading;
  *  - `status` (view_servo/ServoStatus), latched;
  *  - `/diagnostics` (diagnostic_msgs/DiagnosticArray): 1 Hz, camera and homing.
  *
@@ -247,6 +249,7 @@ private:
     command_publisher_ = nh_.advertise<geometry_msgs::Twist>(name, 1);
     stamped_publisher_ = nh_.advertise<geometry_msgs::TwistStamped>(name + "_stamped", 1);
     heading_publisher_ = nh_.advertise<Heading>("heading", 5);
+    arrow_publisher_ = nh_.advertise<geometry_msgs::PoseStamped>("heading_arrow", 5);
     enable_service_ = serve("enable", &HomingNode::enable, this);
     diagnostics_.add("camera", &camera_, &CameraInput::diagnose);
     diagnostics_.add("homing", this, &HomingNode::diagnose);
@@ -254,7 +257,7 @@ private:
     odometry_subscriber_ = nh_.subscribe("odom", 50, &HomingNode::takeOdometry, this, hints);
     points_subscriber_ = nh_.subscribe("point_matches", 1, &HomingNode::takePoints, this, hints);
     lines_subscriber_ = nh_.subscribe("line_matches", 1, &HomingNode::takeLines, this, hints);
-    status_.publish(idleStatus("waits for a goal"));
+    status_.publish(idleStatus());
     worker_ = std::thread([this] { work(); });
     // Called with the action server's lock held, so that mutex_ must never be held where action_ is called.
     action_.registerGoalCallback([this] {
@@ -647,6 +650,7 @@ private:
     if (frame)
     {
       heading_publisher_.publish(toHeading(report_));
+      publishArrow(report_);
       unanswered_frame_ = frame_time;
     }
     if (!session.has_goal && (report.state == HomingState::ARRIVED || report.state == HomingState::FAILED))
@@ -828,20 +832,17 @@ private:
       send(BaseVelocity::Zero());
     }
     const std::uint8_t state = status_.last().state;
-    if (state == ServoStatus::IDLE && !gate_.open())
+    const bool outdated = gate_.open() ? state == ServoStatus::DISABLED : state == ServoStatus::IDLE;
+    if (outdated)
     {
-      status_.publish(idleStatus(""));
-    }
-    else if (state == ServoStatus::DISABLED && gate_.open())
-    {
-      status_.publish(idleStatus("waits for a goal"));
+      status_.publish(idleStatus());
     }
   }
 
-  ServoStatus idleStatus(const std::string& reason) const
+  ServoStatus idleStatus() const
   {
-    return gate_.open() ? makeStatus(ServoStatus::IDLE, reason)
-                        : makeStatus(ServoStatus::DISABLED, "does not drive until ~enable is called");
+    return gate_.open() ? makeStatus(ServoStatus::IDLE, "waits for a goal") :
+                          makeStatus(ServoStatus::DISABLED, "does not drive until ~enable is called");
   }
 
   void send(const BaseVelocity& velocity)
@@ -874,6 +875,20 @@ private:
     message.similarity = report.similarity;
     message.state = toHeadingState(report);
     return message;
+  }
+
+  void publishArrow(const HomingReport& report) const
+  {
+    if (!std::isfinite(report.heading))
+    {
+      return;
+    }
+    geometry_msgs::PoseStamped arrow;
+    arrow.header.stamp = ros::Time(std::max(0.0, report.stamp));
+    arrow.header.frame_id = params_.base_frame;
+    arrow.pose.orientation.z = std::sin(0.5 * report.heading);
+    arrow.pose.orientation.w = std::cos(0.5 * report.heading);
+    arrow_publisher_.publish(arrow);
   }
 
   static ServoStatus toStatus(std::uint8_t state, const std::string& reason, const HomingReport& report)
@@ -946,6 +961,7 @@ private:
   ros::Publisher command_publisher_;
   ros::Publisher stamped_publisher_;
   ros::Publisher heading_publisher_;
+  ros::Publisher arrow_publisher_;
   StatusOutput status_;
   ros::ServiceServer enable_service_;
   CameraInput camera_;

@@ -22,6 +22,7 @@
 #include <fstream>
 #include <functional>
 #include <iostream>
+#include <limits>
 #include <map>
 #include <memory>
 #include <mutex>
@@ -190,10 +191,141 @@ void runHomingExperiment(const ExperimentContext& context, std::ostream& csv)
   }
 }
 
+namespace
+{
+/** What hololens_indoor holds. */
+struct IndoorWalk
+{
+  Camera camera;
+  std::map<std::string, Eigen::Isometry3d> poses;  ///< world from camera
+  struct Pair
+  {
+    std::string reference;
+    std::string current;
+    double baseline;  ///< [m]
+    double rotation;  ///< [degrees]
+    double overlap;
+  };
+  std::vector<Pair> pairs;  ///< each in both directions
+};
+
+std::ifstream openForReading(const fs::path& file)
+{
+  std::ifstream stream(file);
+  if (!stream)
+  {
+    throw std::runtime_error("cannot read " + file.string());
+  }
+  return stream;
+}
+
+IndoorWalk readIndoorWalk(const fs::path& folder)
+{
+  IndoorWalk walk;
+  std::ifstream k = openForReading(folder / "K.txt");
+  for (int i = 0; i < 9; ++i)
+  {
+    k >> walk.camera.k(i / 3, i % 3);
+  }
+  std::string line;
+  std::ifstream poses = openForReading(folder / "poses.txt");
+  while (std::getline(poses, line))
+  {
+    std::istringstream words(line);
+    std::string name;
+    Eigen::Isometry3d pose = Eigen::Isometry3d::Identity();
+    words >> name;
+    for (int i = 0; i < 16; ++i)
+    {
+      words >> pose.matrix()(i / 4, i % 4);
+    }
+    if (words && name.front() != '#')
+    {
+      walk.poses[name] = pose;
+    }
+  }
+  std::ifstream pairs = openForReading(folder / "pairs_wide_baseline.txt");
+  while (std::getline(pairs, line))
+  {
+    std::istringstream words(line);
+    IndoorWalk::Pair pair;
+    if (words >> pair.reference >> pair.current >> pair.baseline >> pair.rotation >> pair.overlap)
+    {
+      walk.pairs.push_back(pair);
+      std::swap(pair.reference, pair.current);
+      walk.pairs.push_back(pair);
+    }
+  }
+  return walk;
+}
+
+Correspondences onUnitPlane(const ViewMatch& match, const Camera& camera)
+{
+  Correspondences pairs;
+  for (const MatchedPoint& point : match.matches)
+  {
+    pairs.push_back({ camera.normalized(point.position.reference), camera.normalized(point.position.current) });
+  }
+  return pairs;
+}
+
+}  // namespace
+
 void runDirectionsExperiment(const ExperimentContext& context, std::ostream& csv)
 {
-  (void)context;
-  (void)csv;
+  const fs::path folder = context.data / "hololens_indoor";
+  IndoorWalk walk = readIndoorWalk(folder);
+  if (context.brief)
+  {
+    walk.pairs.resize(std::min<std::size_t>(walk.pairs.size(), 6));
+  }
+  const ViewMatcher points{ ViewMatcherParams() };
+  const LineViewMatcher lines{ LineMatcherParams() };
+  FeatureParams features;
+  features.points = points.params().points;
+  features.segments = lines.params().segments;
+  features.lines = lines.params().features;
+  HeadingHypothesesParams params;
+  params.motion = CameraMotion::FREE;
+
+  std::vector<std::string> rows(walk.pairs.size());
+  std::mutex mutex;
+  std::size_t done = 0;
+  inParallel(walk.pairs.size(), context.threads, [&](std::size_t i) {
+    const IndoorWalk::Pair& pair = walk.pairs[i];
+    const PreparedImage reference(readGreyImage((folder / "images" / pair.reference).string()), cv::Rect(), features);
+    const PreparedImage current(readGreyImage((folder / "images" / pair.current).string()), cv::Rect(), features);
+    HeadingHypotheses hypotheses(params, walk.camera.k(0, 0));
+    hypotheses.update(onUnitPlane(points.match(reference, current, GeometryModel::HOMOGRAPHY), walk.camera), {});
+    hypotheses.update(onUnitPlane(lines.match(reference.lines(), current.lines(), GeometryModel::HOMOGRAPHY,
+                                              LineGrouping::TRIPLETS),
+                                  walk.camera),
+                      {});
+    const Eigen::Isometry3d truth = walk.poses.at(pair.current).inverse() * walk.poses.at(pair.reference);
+    const double true_heading = std::atan2(-truth.translation().x(), truth.translation().z());
+    const bool accepted = !hypotheses.list().empty();
+    double heading_error = std::numeric_limits<double>::quiet_NaN();
+    double rotation_error = heading_error;
+    std::size_t inliers = 0;
+    if (accepted)
+    {
+      const HeadingHypothesis& best = hypotheses.list().front();
+      heading_error = std::abs(wrapAngle(best.view_in_camera.heading() - true_heading)) * DEGREES;
+      rotation_error = Eigen::AngleAxisd(best.motion.rotation * truth.linear().transpose()).angle() * DEGREES;
+      inliers = best.support.size();
+    }
+    std::ostringstream row;
+    row << pair.reference << ',' << pair.current << ',' << pair.baseline << ',' << pair.rotation << ',' << pair.overlap
+        << ',' << (accepted ? 1 : 0) << ',' << heading_error << ',' << rotation_error << ',' << inliers << '\n';
+    const std::lock_guard<std::mutex> lock(mutex);
+    rows[i] = row.str();
+    std::cerr << ++done << " of " << rows.size() << ": " << rows[i] << std::flush;
+  });
+  csv << "reference,current,baseline_m,rotation_deg,overlap,accepted,heading_error_deg,rotation_error_deg,inliers\n";
+  for (const std::string& row : rows)
+  {
+    csv << row;
+  }
 }
 
 }  // namespace view_servo

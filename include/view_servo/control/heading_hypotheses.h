@@ -3,18 +3,28 @@
 #pragma once
 
 #include "view_servo/control/heading_vote.h"
+#include "view_servo/geometry/essential.h"
 #include "view_servo/geometry/planar_motion.h"
 #include "view_servo/robust/random.h"
 
 #include <cstdint>
+#include <optional>
 #include <string>
 #include <vector>
 
 namespace view_servo
 {
+/** What is known of how the camera moves. */
+enum class CameraMotion
+{
+  PLANAR,  ///< on a floor, tilted as tf says
+  FREE     ///< in any way, as a hand moves it
+};
+
 /** Options of the hypotheses of where the stored view is. */
 struct HeadingHypothesesParams
 {
+  CameraMotion motion = CameraMotion::PLANAR;
   double inlier_threshold = 3.0;  ///< largest error of a match that supports one [px], > 0
   double max_yaw = 0.6;           ///< largest turn between the views that is looked for [rad], (0, pi/2)
   double min_significance = 6.0;  ///< -log10 of the number of false alarms that one may have at first, >= 0
@@ -34,6 +44,7 @@ struct HeadingHypothesis
   PlanarPose view_in_camera;  ///< as seen from the last camera pose, of distance 1
   double weight = 0.0;        ///< share of the matches that agree, faded over those before, at most 1 / (1 - memory)
   int updates = 0;            ///< sets of matches that agreed
+  RelativePose motion;        ///< X_cur = R X_ref + t, of which view_in_camera is the part on the floor
   Correspondences support;    ///< last matches that agree
 };
 
@@ -63,6 +74,10 @@ public:
   }
 
 private:
+  /** The motion that most of them agree with, unless chance explains it. */
+  std::optional<RelativePose> suggest(const Correspondences& matches);
+  RelativePose refine(const RelativePose& motion, const Correspondences& support) const;
+  void keepTheBest();
   void confirm(HeadingHypothesis& hypothesis, const Correspondences& matches, const PlanarPose& camera_in_odom);
 
   HeadingHypothesesParams params_;

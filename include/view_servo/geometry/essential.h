@@ -1,0 +1,42 @@
+// Copyright (c) 2026, the view_servo authors
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include "view_servo/geometry/correspondence.h"
+
+#include <Eigen/Core>
+
+#include <vector>
+
+namespace view_servo
+{
+/** @file
+ * Essential matrices: fundamental matrices of points (x, y) on the plane z = 1 of their cameras' frames.
+ */
+
+/** Motion between two calibrated cameras: X_cur = R X_ref + t, the length of t unknown. */
+struct RelativePose
+{
+  Eigen::Matrix3d rotation;
+  Eigen::Vector3d translation;  ///< of length 1
+
+  /** x_curᵀ E x_ref = 0, E = [t]x R. */
+  Eigen::Matrix3d essential() const;
+};
+
+/** [v]x: the matrix whose product with w is v × w. */
+Eigen::Matrix3d crossMatrix(const Eigen::Vector3d& v);
+
+/** The up to ten essential matrices of exactly five correspondences (Nistér 2004). */
+std::vector<Eigen::Matrix3d> essentialFromFivePoints(const Correspondences& five);
+
+/** The four motions of an essential matrix; of these, points lie in front of both cameras for one at most. */
+std::vector<RelativePose> posesFromEssential(const Eigen::Matrix3d& essential);
+
+/**
+ * Minimises the summed squared Sampson distance over the five parameters of the motion by Levenberg-Marquardt from
+ * `initial`, which is returned when it cannot be improved.
+ */
+RelativePose refineRelativePose(const RelativePose& initial, const Correspondences& pairs, int max_iterations = 10);
+
+}  // namespace view_servo
