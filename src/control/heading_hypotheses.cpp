@@ -79,6 +79,7 @@ void HeadingHypotheses::update(const Correspondences& matches, const PlanarPose&
 {
   for (HeadingHypothesis& hypothesis : hypotheses_)
   {
+    hypothesis.weight *= params_.memory;
     confirm(hypothesis, matches, camera_in_odom);
   }
 
@@ -104,18 +105,6 @@ void HeadingHypotheses::update(const Correspondences& matches, const PlanarPose&
       hypotheses_.push_back(hypothesis);
     }
     left = agreeing(left, *motion, threshold_, false);
-  }
-  // Each set of matches compares the hypotheses: what its best one explains counts 1, however many matches there are.
-  std::size_t most = 1;
-  for (const HeadingHypothesis& hypothesis : hypotheses_)
-  {
-    most = std::max(most, hypothesis.support.size());
-  }
-  for (HeadingHypothesis& hypothesis : hypotheses_)
-  {
-    hypothesis.weight *= params_.memory;
-    hypothesis.weight += static_cast<double>(hypothesis.support.size()) / static_cast<double>(most);
-    hypothesis.updates += hypothesis.support.empty() ? 0 : 1;
   }
   keepTheBest();
 }
@@ -150,14 +139,15 @@ std::optional<RelativePose> HeadingHypotheses::suggest(const Correspondences& ma
     return sampsonError(essential, { support[reference].reference, support[current].current }) <=
            threshold_ * threshold_;
   });
-  const double significance = logSignificance(matches.size(), support.size(), sample_size, std::max(by_area, among));
+  const double significance =
+      logSignificance(matches.size(), support.size(), sample_size, std::max(by_area, among));
   return significance >= params_.min_significance ? motion : std::nullopt;
 }
 
 RelativePose HeadingHypotheses::refine(const RelativePose& motion, const Correspondences& support) const
 {
-  return params_.motion == CameraMotion::PLANAR ? toRelative(refinePlanarMotion(toPlanar(motion), support))
-                                                : refineRelativePose(motion, support);
+  return params_.motion == CameraMotion::PLANAR ? toRelative(refinePlanarMotion(toPlanar(motion), support)) :
+                                                  refineRelativePose(motion, support);
 }
 
 void HeadingHypotheses::keepTheBest()
@@ -206,14 +196,15 @@ void HeadingHypotheses::confirm(HeadingHypothesis& hypothesis, const Corresponde
   if (matches.empty() || static_cast<double>(support.size()) < LEAST_PART * static_cast<double>(matches.size()))
   {
     hypothesis.view_in_camera = direction;
-    hypothesis.support.clear();
     return;
   }
   const PlanarPose planar = toPlanar(motion);
   hypothesis.motion = motion;
   hypothesis.view_in_camera = planar;
   hypothesis.view_in_odom = compose(camera_in_odom, { distance * planar.x, distance * planar.y, planar.yaw });
+  hypothesis.weight += static_cast<double>(support.size()) / static_cast<double>(matches.size());
   hypothesis.support = std::move(support);
+  ++hypothesis.updates;
 }
 
 }  // namespace view_servo

@@ -148,7 +148,8 @@ public:
     double speed = params_.gain * goal.distance();
     if (blind_)
     {
-      speed = std::min(speed, params_.blind_speed);
+      // Matches alone tell no distance.
+      speed = tracker_.hasStructure() ? std::min(speed, params_.blind_speed) : params_.blind_speed;
     }
     const double heading = goal.heading();
     return { speed * std::cos(heading), speed * std::sin(heading), params_.turn_gain * goal.yaw };
@@ -176,7 +177,12 @@ protected:
     {
       checkStructure(best, evidence.pairs, camera_in_odom);
     }
-    if (!tracker_.hasStructure() && params_.hypotheses.motion == CameraMotion::PLANAR)
+    else if (tracker_.hasStructure())
+    {
+      contradict();  // matches are there, but its points are nowhere
+    }
+    if (!tracker_.hasStructure() && params_.hypotheses.motion == CameraMotion::PLANAR &&
+        best.support.size() >= ENOUGH_SUPPORT)
     {
       const PlanarPose unit = best.view_in_camera;
       const double distance = compose(inverse(camera_in_odom), best.view_in_odom).distance();
@@ -224,7 +230,8 @@ protected:
   }
 
 private:
-  static constexpr int MIN_UPDATES = 2;  // sets of matches that agree before a hypothesis is followed
+  static constexpr std::size_t ENOUGH_SUPPORT = 40;  // matches that structure is made from
+  static constexpr int MIN_UPDATES = 2;              // sets of matches that agree before a hypothesis is followed
 
   /** The view's base pose as seen from the base. */
   PlanarPose goalInBase(const PlanarPose& base) const
@@ -255,7 +262,6 @@ private:
   void checkStructure(const HeadingHypothesis& best, const Correspondences& matches, const PlanarPose& camera)
   {
     constexpr double CLEARLY_LESS = 0.7;
-    constexpr int MAX_CONTRADICTIONS = 3;
     const PlanarPose pose = compose(inverse(camera), *view_in_odom_);
     const double threshold = params_.hypotheses.inlier_threshold / target_.camera.k(0, 0);
     const Eigen::Matrix3d essential = essentialMatrix(pose);
@@ -269,15 +275,22 @@ private:
     }
     if (static_cast<double>(agreeing.size()) < CLEARLY_LESS * static_cast<double>(best.support.size()))
     {
-      if (++contradictions_ >= MAX_CONTRADICTIONS)
-      {
-        tracker_.clear();
-        tracked_ = false;
-      }
+      contradict();
       return;
     }
     contradictions_ = 0;
     tracker_.extend(agreeing, { pose.x / scale_, pose.y / scale_, pose.yaw });
+  }
+
+  void contradict()
+  {
+    constexpr int MAX_CONTRADICTIONS = 3;
+    if (++contradictions_ >= MAX_CONTRADICTIONS)
+    {
+      tracker_.clear();
+      tracked_ = false;
+      contradictions_ = 0;
+    }
   }
 
   /** The unit of the structure, from how far odometry says the camera has moved within it. */
@@ -287,6 +300,7 @@ private:
     constexpr double SHORTEST = 0.08;  // [m]
     constexpr double WEIGHT = 0.2;
     constexpr double MAX_CHANGE = 4.0;
+    constexpr double MAX_SCALE = 20.0;
     const PlanarPose camera_in_view = inverse(view_in_camera);
     trail_.push_back({ camera_in_odom, camera_in_view });
     while (trail_.size() > 2 && compose(inverse(trail_[1].in_odom), camera_in_odom).distance() > LONGEST)
@@ -299,15 +313,18 @@ private:
     if (by_odometry >= SHORTEST && by_view > 0.0)
     {
       const double measured = std::clamp(by_odometry / by_view, scale_ / MAX_CHANGE, scale_ * MAX_CHANGE);
-      scale_ *= std::pow(measured / scale_, WEIGHT);
+      scale_ = std::clamp(scale_ * std::pow(measured / scale_, WEIGHT), 1.0 / MAX_SCALE, MAX_SCALE);
     }
   }
 
   /** State, arrival and loss after an image. */
   void judge(double stamp, const PlanarPose& base)
   {
-    constexpr double POSITION_DOUBT = 0.05;  // of where the view is, for the region of interest [m]
-    constexpr double COAST = 0.5;            // matches are older than the image when they come [s]
+    constexpr double POSITION_DOUBT = 0.05;       // of where the view is, for the region of interest [m]
+    constexpr double ARRIVED_DISPLACEMENT = 1.5;  // of the view's points, in the median [px]
+    constexpr double ARRIVED_CONFIDENCE = 0.75;   // share of the points that must be there
+    constexpr double AT_VIEW_DISPLACEMENT = 15.0;
+    constexpr double COAST = 0.5;  // matches are older than the image when they come [s]
     if (!view_in_odom_)
     {
       giveUpAfter(stamp, started_, "the view was not found", HomingState::ACQUIRING, "looking for the view");
@@ -337,10 +354,13 @@ private:
       setState(HomingState::APPROACHING, "the heading is known");
       return;
     }
+    // Whatever the structure and its scale say, the points must be where the view has them.
+    const bool in_place = report_.displacement <= ARRIVED_DISPLACEMENT && report_.confidence >= ARRIVED_CONFIDENCE &&
+                          report_.similarity >= params_.min_similarity;
     report_.at_view = report_.distance <= params_.arrival_distance && std::abs(goal.yaw) <= params_.arrival_yaw &&
-                      report_.similarity >= params_.min_similarity;
-    const bool within = report_.distance <= params_.distance_tolerance && std::abs(goal.yaw) <= params_.yaw_tolerance &&
-                        report_.similarity >= params_.min_similarity;
+                      report_.displacement <= AT_VIEW_DISPLACEMENT && report_.similarity >= params_.min_similarity;
+    const bool within =
+        in_place && report_.distance <= params_.distance_tolerance && std::abs(goal.yaw) <= params_.yaw_tolerance;
     if (!within)
     {
       within_since_ = NOT_A_NUMBER;

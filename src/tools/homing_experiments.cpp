@@ -296,15 +296,14 @@ void runDirectionsExperiment(const ExperimentContext& context, std::ostream& csv
     const PreparedImage reference(readGreyImage((folder / "images" / pair.reference).string()), cv::Rect(), features);
     const PreparedImage current(readGreyImage((folder / "images" / pair.current).string()), cv::Rect(), features);
     HeadingHypotheses hypotheses(params, walk.camera.k(0, 0));
-    const Correspondences by_points =
-        onUnitPlane(points.match(reference, current, GeometryModel::HOMOGRAPHY), walk.camera);
-    const Correspondences by_lines =
-        onUnitPlane(lines.match(reference.lines(), current.lines(), GeometryModel::HOMOGRAPHY, LineGrouping::TRIPLETS),
-                    walk.camera);
-    // As they come from the two matchers while the camera is held still.
-    for (const Correspondences& matches : { by_points, by_lines, by_points })
+    hypotheses.update(onUnitPlane(points.match(reference, current, GeometryModel::HOMOGRAPHY), walk.camera), {});
+    if (hypotheses.list().empty())
     {
-      hypotheses.update(matches, PlanarPose());
+      // Where there is too little texture.
+      hypotheses.update(onUnitPlane(lines.match(reference.lines(), current.lines(), GeometryModel::HOMOGRAPHY,
+                                                LineGrouping::TRIPLETS),
+                                    walk.camera),
+                        {});
     }
     const Eigen::Isometry3d truth = walk.poses.at(pair.current).inverse() * walk.poses.at(pair.reference);
     const double true_heading = std::atan2(-truth.translation().x(), truth.translation().z());

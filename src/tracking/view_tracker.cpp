@@ -88,11 +88,17 @@ private:
   double scale_v_ = 1.0;
 };
 
+/** The value below which that part of them lies; reorders them. */
+double quantile(std::vector<double>& values, double part)
+{
+  const auto place = values.begin() + static_cast<std::ptrdiff_t>(part * static_cast<double>(values.size()));
+  std::nth_element(values.begin(), place, values.end());
+  return *place;
+}
+
 double median(std::vector<double>& values)
 {
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
+  return quantile(values, 0.5);
 }
 
 /** The depth of a landmark in the current camera divided by that in the stored view. */
@@ -159,8 +165,10 @@ const ViewTracker::Point* ViewTracker::nearest(const Eigen::Vector2d& level_poin
 
 bool ViewTracker::start(const Correspondences& matches, const PlanarPose& pose)
 {
-  // Depths are known when moving by the pose's length displaces most points by more than this.
-  constexpr double MIN_PARALLAX = 6.0;  // [px]
+  // Depths are known when moving by the pose's length displaces a fifth of the points by more than this: those in the
+  // direction of a corridor hardly move however far one goes.
+  constexpr double MIN_PARALLAX = 15.0;  // [px]
+  constexpr double QUANTILE = 0.8;
   std::vector<double> parallaxes;
   for (const Correspondence& match : matches)
   {
@@ -173,7 +181,7 @@ bool ViewTracker::start(const Correspondences& matches, const PlanarPose& pose)
   }
   ViewTracker fresh(*this);
   fresh.landmarks_.clear();
-  fresh.depths_known_ = median(parallaxes) >= MIN_PARALLAX;
+  fresh.depths_known_ = quantile(parallaxes, QUANTILE) >= MIN_PARALLAX;
   fresh.extend(matches, pose);
   if (static_cast<int>(fresh.landmarks_.size()) < params_.min_supporting)
   {

@@ -1,5 +1,6 @@
 // Copyright (c) 2026, the view_servo authors
 // SPDX-License-Identifier: BSD-3-Clause
+#include "view_servo/control/homing_parameters.h"
 #include "view_servo/views/matcher_parameters.h"
 
 #include <gtest/gtest.h>
@@ -13,16 +14,11 @@ namespace view_servo
 namespace
 {
 /** What is there is documented in the file: every parameter, with its default. */
-template <typename Params>
-void expectEveryParameterAtItsDefault(const std::string& file)
+void expectEveryParameterAtItsDefault(const std::string& file, const std::vector<Parameter>& table,
+                                      const std::vector<std::string>& of_the_node)
 {
   SCOPED_TRACE(file);
   const YAML::Node config = YAML::LoadFile(CONFIG_DIR "/" + file);
-  const std::vector<std::string> of_the_node = {
-    "view", "rate", "views_dir", "allow_paths", "image_transport", "queue_size", "max_image_age"
-  };
-  Params params;
-  const std::vector<Parameter> table = matcherParameters(params);
   EXPECT_EQ(config.size(), of_the_node.size() + table.size());
   for (const std::string& name : of_the_node)
   {
@@ -37,14 +33,30 @@ void expectEveryParameterAtItsDefault(const std::string& file)
   }
 }
 
+const std::vector<std::string> OF_MATCHERS = {
+  "view", "rate", "views_dir", "allow_paths", "image_transport", "queue_size", "max_image_age"
+};
+
 TEST(Config, PointMatcherHasEveryParameterAtItsDefault)
 {
-  expectEveryParameterAtItsDefault<ViewMatcherParams>("point_matcher.yaml");
+  ViewMatcherParams params;
+  expectEveryParameterAtItsDefault("point_matcher.yaml", matcherParameters(params), OF_MATCHERS);
 }
 
 TEST(Config, LineMatcherHasEveryParameterAtItsDefault)
 {
-  expectEveryParameterAtItsDefault<LineMatcherParams>("line_matcher.yaml");
+  LineMatcherParams params;
+  expectEveryParameterAtItsDefault("line_matcher.yaml", matcherParameters(params), OF_MATCHERS);
+}
+
+TEST(Config, HomingHasEveryParameterAtItsDefault)
+{
+  HomingParams params;
+  BaseLimits limits;
+  expectEveryParameterAtItsDefault("homing.yaml", homingParameters(params, limits),
+                                   { "view", "views_dir", "base_frame", "point_matcher", "line_matcher", "dry_run",
+                                     "timeout", "control_rate", "image_timeout", "odometry_timeout", "match_timeout",
+                                     "image_transport", "queue_size", "max_image_age" });
 }
 
 }  // namespace

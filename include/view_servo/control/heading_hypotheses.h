@@ -42,10 +42,10 @@ struct HeadingHypothesis
 {
   PlanarPose view_in_odom;  ///< of its level camera; the direction from the last camera pose is known, the distance not
   PlanarPose view_in_camera;  ///< as seen from the last camera pose, of distance 1
-  double weight = 0.0;        ///< agreeing matches to those of the best, faded over sets, at most 1 / (1 - memory)
+  double weight = 0.0;        ///< share of the matches that agree, faded over those before, at most 1 / (1 - memory)
   int updates = 0;            ///< sets of matches that agreed
   RelativePose motion;        ///< X_cur = R X_ref + t, of which view_in_camera is the part on the floor
-  Correspondences support;    ///< of the last matches, those that agree
+  Correspondences support;    ///< last matches that agree
 };
 
 /**

@@ -41,7 +41,7 @@ struct HomingParams
   double turn_gain = 1.0;              ///< turn rate per yaw error [1/s], > 0
   double blind_speed = 0.1;            ///< while only the heading is known [m/s], > 0
   double distance_tolerance = 0.002;   ///< of having arrived [m], > 0
-  double yaw_tolerance = 0.0035;       ///< likewise [rad], > 0
+  double yaw_tolerance = 0.002;        ///< likewise [rad], > 0
   double dwell = 0.5;                  ///< time that the base has to stay within the tolerances [s], >= 0
   double arrival_distance = 0.01;      ///< to the view, within which it counts as reached though still driving [m], > 0
   double arrival_yaw = 0.0175;         ///< likewise [rad], > 0
