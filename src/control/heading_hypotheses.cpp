@@ -139,15 +139,14 @@ std::optional<RelativePose> HeadingHypotheses::suggest(const Correspondences& ma
     return sampsonError(essential, { support[reference].reference, support[current].current }) <=
            threshold_ * threshold_;
   });
-  const double significance =
-      logSignificance(matches.size(), support.size(), sample_size, std::max(by_area, among));
+  const double significance = logSignificance(matches.size(), support.size(), sample_size, std::max(by_area, among));
   return significance >= params_.min_significance ? motion : std::nullopt;
 }
 
 RelativePose HeadingHypotheses::refine(const RelativePose& motion, const Correspondences& support) const
 {
-  return params_.motion == CameraMotion::PLANAR ? toRelative(refinePlanarMotion(toPlanar(motion), support)) :
-                                                  refineRelativePose(motion, support);
+  return params_.motion == CameraMotion::PLANAR ? toRelative(refinePlanarMotion(toPlanar(motion), support))
+                                                : refineRelativePose(motion, support);
 }
 
 void HeadingHypotheses::keepTheBest()

@@ -35,7 +35,8 @@ struct RelativePoseProblem
     return sum;
   }
 
-  void linearize(const RelativePose& pose, Eigen::Matrix<double, 5, 5>& jtj, Eigen::Matrix<double, 5, 1>& gradient) const
+  void linearize(const RelativePose& pose, Eigen::Matrix<double, 5, 5>& jtj,
+                 Eigen::Matrix<double, 5, 1>& gradient) const
   {
     jtj.setZero();
     gradient.setZero();

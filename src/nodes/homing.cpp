@@ -841,8 +841,8 @@ private:
 
   ServoStatus idleStatus() const
   {
-    return gate_.open() ? makeStatus(ServoStatus::IDLE, "waits for a goal") :
-                          makeStatus(ServoStatus::DISABLED, "does not drive until ~enable is called");
+    return gate_.open() ? makeStatus(ServoStatus::IDLE, "waits for a goal")
+                        : makeStatus(ServoStatus::DISABLED, "does not drive until ~enable is called");
   }
 
   void send(const BaseVelocity& velocity)

@@ -53,10 +53,10 @@ TEST(Config, HomingHasEveryParameterAtItsDefault)
 {
   HomingParams params;
   BaseLimits limits;
-  expectEveryParameterAtItsDefault("homing.yaml", homingParameters(params, limits),
-                                   { "view", "views_dir", "base_frame", "point_matcher", "line_matcher", "dry_run",
-                                     "timeout", "control_rate", "image_timeout", "odometry_timeout", "match_timeout",
-                                     "image_transport", "queue_size", "max_image_age" });
+  expectEveryParameterAtItsDefault(
+      "homing.yaml", homingParameters(params, limits),
+      { "view", "views_dir", "base_frame", "point_matcher", "line_matcher", "dry_run", "timeout", "control_rate",
+        "image_timeout", "odometry_timeout", "match_timeout", "image_transport", "queue_size", "max_image_age" });
 }
 
 }  // namespace
