@@ -82,7 +82,10 @@ Arrival ArrivalDetector::add(double similarity)
         largest_ = similarity;
       }
     }
-    history_.push_back(similarity);
+    if (state_ == Arrival::APPROACHING)
+    {
+      history_.push_back(similarity);
+    }
   }
   else if (state_ == Arrival::NEAR)
   {

@@ -51,6 +51,12 @@ PlanarPose toPlanar(const RelativePose& motion)
   return { std::cos(heading), std::sin(heading), std::atan2(-ahead.x(), ahead.z()) };
 }
 
+/** That a match made by chance agrees with a motion. */
+double chanceByArea(double threshold)
+{
+  return 2.0 * threshold * EPIPOLAR_BAND / IMAGE_AREA;
+}
+
 bool same(const PlanarPose& a, const PlanarPose& b)
 {
   return std::abs(wrapAngle(a.heading() - b.heading())) < SAME_HEADING && std::abs(wrapAngle(a.yaw - b.yaw)) < SAME_YAW;
@@ -134,12 +140,12 @@ std::optional<RelativePose> HeadingHypotheses::suggest(const Correspondences& ma
   }
   const Correspondences support = agreeing(matches, *motion, threshold_, true);
   const Eigen::Matrix3d essential = motion->essential();
-  const double by_area = 2.0 * threshold_ * EPIPOLAR_BAND / IMAGE_AREA;
   const double among = chanceAmong(support.size(), [&](std::size_t reference, std::size_t current) {
     return sampsonError(essential, { support[reference].reference, support[current].current }) <=
            threshold_ * threshold_;
   });
-  const double significance = logSignificance(matches.size(), support.size(), sample_size, std::max(by_area, among));
+  const double significance =
+      logSignificance(matches.size(), support.size(), sample_size, std::max(chanceByArea(threshold_), among));
   return significance >= params_.min_significance ? motion : std::nullopt;
 }
 
@@ -176,8 +182,9 @@ void HeadingHypotheses::keepTheBest()
 void HeadingHypotheses::confirm(HeadingHypothesis& hypothesis, const Correspondences& matches,
                                 const PlanarPose& camera_in_odom)
 {
-  constexpr double WIDE = 3.0;      // times the threshold, for matches that a prediction is corrected by
-  constexpr double CLOSEST = 0.05;  // the least distance that a hypothesis keeps [m]
+  constexpr double WIDE = 3.0;        // times the threshold, for matches that a prediction is corrected by
+  constexpr double CONFIRMING = 2.0;  // significance; less than at first, as one is expected already
+  constexpr double CLOSEST = 0.05;    // the least distance that a hypothesis keeps [m]
   const PlanarPose predicted = compose(inverse(camera_in_odom), hypothesis.view_in_odom);
   const double distance = std::max(predicted.distance(), CLOSEST);
   const PlanarPose direction{ std::cos(predicted.heading()), std::sin(predicted.heading()), predicted.yaw };
@@ -192,9 +199,12 @@ void HeadingHypotheses::confirm(HeadingHypothesis& hypothesis, const Corresponde
     }
   }
   Correspondences support = agreeing(matches, motion, threshold_, true);
-  if (matches.empty() || static_cast<double>(support.size()) < LEAST_PART * static_cast<double>(matches.size()))
+  const int sample_size =
+      params_.motion == CameraMotion::PLANAR ? PlanarMotionEstimator::SAMPLE_SIZE : RelativePoseEstimator::SAMPLE_SIZE;
+  if (logSignificance(matches.size(), support.size(), sample_size, chanceByArea(threshold_)) < CONFIRMING)
   {
     hypothesis.view_in_camera = direction;
+    hypothesis.support.clear();
     return;
   }
   const PlanarPose planar = toPlanar(motion);

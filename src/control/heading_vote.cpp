@@ -47,6 +47,7 @@ std::vector<std::string> HeadingVoteParams::validate() const
   faults.require(narrowing > 0.0 && narrowing <= 1.0, "roi_narrowing must lie in (0, 1]");
   faults.require(widening >= 1.0, "roi_widening must be at least 1");
   faults.require(min_half_width > 0.0 && min_half_width < M_PI_2, "roi_min_half_width must lie in (0, pi/2)");
+  faults.require(!(min_half_width > M_PI_2 - margin), "roi_min_half_width must leave room for heading_margin");
   return faults.list();
 }
 
@@ -71,7 +72,8 @@ HeadingHistogram::HeadingHistogram(const HeadingEvidence& evidence, double yaw, 
       continue;
     }
     const double epipole = reference.x() - reference.y() * (current.x() - reference.x()) / rise;
-    const double heading = wrapAngle(yaw - std::atan(epipole));
+    // The line says where the epipole is, not which way along it: the one of the two headings that is ahead.
+    const double heading = std::remainder(yaw - std::atan(epipole), M_PI);
     const double bin = std::round((heading + M_PI_2) / bin_width);
     if (bin >= 0.0 && bin < params.bins)
     {

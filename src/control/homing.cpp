@@ -97,6 +97,17 @@ protected:
   void takeImage(double stamp, const cv::Mat& /*grey*/) override
   {
     constexpr double AT_REST = 0.003;  // moved between two images of a base that stands [m]
+    if (ended())
+    {
+      return;
+    }
+    if (stamp - last_trace_ > params_.lost_timeout)
+    {
+      moving_ = false;
+      setState(HomingState::FAILED,
+               report_.state == HomingState::ACQUIRING ? "the view was not found" : "the view was lost");
+      return;
+    }
     const std::optional<PlanarPose> base = odometry_.at(stamp);
     if (!base || moving_)
     {
@@ -172,7 +183,7 @@ protected:
     {
       return;
     }
-    const bool located = tracker_.hasStructure() && !tracked_ && locate(stamp, evidence.pairs, camera_in_odom);
+    bool located = tracker_.hasStructure() && !tracked_ && locate(stamp, evidence.pairs, camera_in_odom);
     if (tracked_ || located)
     {
       checkStructure(best, evidence.pairs, camera_in_odom);
@@ -191,6 +202,8 @@ protected:
         scale_ = 1.0;
         trail_.clear();
         contradictions_ = 0;
+        // Matches that hardly move tell no direction to follow, but where the points are.
+        located = !tracker_.depthsKnown() && locate(stamp, evidence.pairs, camera_in_odom);
       }
     }
     if (!tracked_ && !located)

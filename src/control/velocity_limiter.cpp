@@ -36,6 +36,10 @@ BaseVelocity VelocityLimiter::next(const BaseVelocity& wanted, double dt)
     velocity_.setZero();
     return velocity_;
   }
+  if (!(dt > 0.0))
+  {
+    return velocity_;
+  }
   const BaseVelocity allowed = scaleWithin(wanted, limits_.max_speed, limits_.max_turn_rate) * wanted;
   const BaseVelocity change = allowed - velocity_;
   velocity_ += scaleWithin(change, dt * limits_.max_acceleration, dt * limits_.max_turn_acceleration) * change;

@@ -392,6 +392,10 @@ PlanarPose refinePlanarPose(const PlanarPose& initial, const std::vector<Sightin
 {
   constexpr int ITERATIONS = 20;
   constexpr double LIMIT = 3.0;  // times the width
+  if (sightings.size() < 2)
+  {
+    return initial;
+  }
   PlanarPose pose = initial;
   levenbergMarquardt(PoseProblem{ sightings, LIMIT * width }, pose, ITERATIONS);
   pose.yaw = wrapAngle(pose.yaw);

@@ -228,18 +228,27 @@ void ViewTracker::extend(const Correspondences& matches, const PlanarPose& pose)
   }
 }
 
-ViewTracker::Result ViewTracker::fit(const std::vector<Sighting>& sightings, const PlanarPose& initial) const
+ViewTracker::Result ViewTracker::fit(const std::vector<Sighting>& sightings, double max_residual) const
 {
   const double focal = camera_.k(0, 0);
   Result result;
   result.looked_for = static_cast<int>(sightings.size());
-  result.pose = refinePlanarPose(initial, sightings, params_.max_residual / focal);
+  RansacParams ransac_params;
+  ransac_params.inlier_threshold = max_residual / focal;
+  ransac_params.sampling = Sampling::UNIFORM;
+  Rng rng(1);
+  const auto found = ransac(PlanarPoseEstimator(sightings, ransac_params.inlier_threshold), ransac_params, rng);
+  if (!found.model)
+  {
+    return result;
+  }
+  result.pose = refinePlanarPose(*found.model, sightings, params_.max_residual / focal);
   double squares = 0.0;
   std::vector<double> displacements;
   for (const Sighting& sighting : sightings)
   {
     const double residual = focal * (project(sighting.landmark, result.pose) - sighting.current).norm();
-    if (residual <= params_.max_residual)
+    if (residual <= max_residual)
     {
       ++result.supporting;
       squares += residual * residual;
@@ -251,6 +260,7 @@ ViewTracker::Result ViewTracker::fit(const std::vector<Sighting>& sightings, con
     result.rms = std::sqrt(squares / result.supporting);
     result.displacement = median(displacements);
   }
+  result.found = result.supporting >= params_.min_supporting;
   return result;
 }
 
@@ -317,15 +327,9 @@ ViewTracker::Result ViewTracker::track(const cv::Mat& current, const PlanarPose&
       sightings.push_back({ tracked[i]->landmark, levelOf(pixel) });
     }
   }
-  if (static_cast<int>(sightings.size()) < params_.min_supporting)
-  {
-    result.looked_for = static_cast<int>(tracked.size());
-    return result;
-  }
-  result = fit(sightings, predicted);
+  result = fit(sightings, params_.max_residual);
   result.looked_for = static_cast<int>(tracked.size());
-  result.found = result.supporting >= params_.min_supporting &&
-                 result.supporting >= params_.min_support * static_cast<double>(tracked.size());
+  result.found = result.found && result.supporting >= params_.min_support * result.looked_for;
   return result;
 }
 
@@ -340,21 +344,8 @@ ViewTracker::Result ViewTracker::locate(const Correspondences& matches) const
       sightings.push_back({ point->landmark, match.current });
     }
   }
-  Result result;
-  result.looked_for = static_cast<int>(sightings.size());
-  RansacParams ransac_params;
-  ransac_params.inlier_threshold = COARSE * params_.max_residual / camera_.k(0, 0);
-  ransac_params.sampling = Sampling::UNIFORM;
-  Rng rng(1);
-  const auto found = ransac(PlanarPoseEstimator(sightings, ransac_params.inlier_threshold), ransac_params, rng);
-  if (!found.model)
-  {
-    return result;
-  }
-  result = fit(sightings, *found.model);
-  result.supporting = static_cast<int>(found.inliers.size());
-  result.found = result.supporting >= params_.min_supporting &&
-                 result.supporting >= params_.min_support * static_cast<double>(sightings.size());
+  Result result = fit(sightings, COARSE * params_.max_residual);
+  result.found = result.found && result.supporting >= params_.min_support * result.looked_for;
   return result;
 }
 

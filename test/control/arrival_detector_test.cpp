@@ -228,6 +228,21 @@ TEST(ArrivalDetector, NoRiseCountsBeforeThereIsAHistory)
   }
 }
 
+TEST(ArrivalDetector, DropIsAPartOfTheGainSinceTheApproach)
+{
+  // From 0.1 to 0.6: 0.5 gained, of which a tenth is lost at 0.55.
+  for (const double after : { 0.5525, 0.5475 })
+  {
+    ArrivalDetector detector{ ArrivalDetectorParams() };
+    for (int i = 0; i < 5; ++i)
+    {
+      detector.add(0.1);
+    }
+    EXPECT_EQ(detector.add(0.6), Arrival::NEAR);
+    EXPECT_EQ(detector.add(after), after > 0.55 ? Arrival::NEAR : Arrival::REACHED) << after;
+  }
+}
+
 TEST(ArrivalDetector, StaysWhereItIsOnceReached)
 {
   const Approach run = approach(1);

@@ -228,6 +228,58 @@ TEST(HeadingHypotheses, ForgetWhatNothingConfirms)
   }
 }
 
+TEST(HeadingHypotheses, WhatOnlyChanceConfirmsStaysFarBehind)
+{
+  // No match is of the copy any more: what agrees with it does so by chance, and agrees with the view as well.
+  RepeatedScene scene;
+  scene.copy = { 0.1, -2.5 };
+  for (std::uint64_t seed = 1; seed <= 5; ++seed)
+  {
+    HeadingHypotheses hypotheses(HeadingHypothesesParams(), FOCAL_LENGTH);
+    Rng rng(seed);
+    hypotheses.update(scene.matches({}, 60, 40, 20, rng), {});
+    ASSERT_EQ(hypotheses.list().size(), 2U) << seed;
+    PlanarPose camera;
+    for (int i = 1; i <= 10; ++i)
+    {
+      camera = { 0.02 * i, 0.05 * i, 0.0 };
+      hypotheses.update(scene.matches(camera, 60, 0, 60, rng), camera);
+    }
+    EXPECT_TRUE(scene.isOf(false, hypotheses.list()[0], camera)) << seed;
+    if (hypotheses.list().size() > 1U)
+    {
+      EXPECT_LT(hypotheses.list()[1].weight, 0.4 * hypotheses.list()[0].weight) << seed;
+    }
+  }
+}
+
+TEST(HeadingHypotheses, RandomMatchesConfirmNothing)
+{
+  const RepeatedScene scene;
+  for (const int count : { 30, 120 })
+  {
+    for (std::uint64_t seed = 1; seed <= 3; ++seed)
+    {
+      HeadingHypotheses hypotheses(HeadingHypothesesParams(), FOCAL_LENGTH);
+      Rng rng(seed);
+      hypotheses.update(scene.matches({}, 60, 0, 0, rng), {});
+      ASSERT_EQ(hypotheses.list().size(), 1U);
+      const HeadingHypothesis at_first = hypotheses.list().front();
+      for (int i = 0; i < 5; ++i)
+      {
+        Correspondences matches;
+        addRandomMatches(count, rng, matches);
+        hypotheses.update(matches, {});
+      }
+      if (!hypotheses.list().empty())
+      {
+        EXPECT_EQ(hypotheses.list().front().updates, 1) << count << " matches, seed " << seed;
+        EXPECT_LT(hypotheses.list().front().weight, 0.2 * at_first.weight) << count << " matches, seed " << seed;
+      }
+    }
+  }
+}
+
 TEST(HeadingHypotheses, NoneWithoutAnyReason)
 {
   HeadingHypotheses hypotheses(HeadingHypothesesParams(), FOCAL_LENGTH);

@@ -160,6 +160,17 @@ TEST(HeadingHistogram, TakesTheTurnOut)
   EXPECT_GT(with.votes()[*with.peak(-M_PI_2, M_PI_2)], 2.0 * without.votes()[*without.peak(-M_PI_2, M_PI_2)]);
 }
 
+TEST(HeadingHistogram, HeadingsFarToTheSideSurviveATurn)
+{
+  // In the reference camera's frame such an epipole lies beyond +-pi/2, where it stands for the opposite direction.
+  for (const auto& [heading, yaw] : { std::make_pair(-1.24, 0.5), std::make_pair(1.24, -0.5) })
+  {
+    Rng rng(3);
+    const HeadingEvidence evidence = evidenceOf(towards(heading, 0.8, yaw), 100, 0, rng);
+    EXPECT_NEAR(peakHeading(HeadingHistogram(evidence, yaw, HeadingVoteParams())), heading, 2.0 * DEGREE);
+  }
+}
+
 TEST(HeadingHistogram, CountsWeights)
 {
   EXPECT_NEAR(peakHeading(votesFor({ { 0.5, 1.0 }, { -0.5, 2.0 } })), -0.5, 0.51 * BIN);
@@ -324,6 +335,15 @@ TEST(HeadingVoteParams, NameAllFaultsAtOnce)
   params.widening = std::numeric_limits<double>::quiet_NaN();
   params.margin = std::numeric_limits<double>::quiet_NaN();
   EXPECT_EQ(params.validate().size(), 2U);
+}
+
+TEST(HeadingVoteParams, LeaveRoomForTheRegion)
+{
+  // The margins leave less than the least width of the region: std::clamp() must not be asked for that.
+  HeadingVoteParams params;
+  params.margin = 1.5;
+  params.min_half_width = 0.1;
+  EXPECT_FALSE(params.validate().empty());
 }
 
 }  // namespace view_servo

@@ -49,6 +49,23 @@ TEST(InputWatch, BecomesStaleAfterItsTimeout)
   EXPECT_GT(watch.age(), 0.02);
 }
 
+TEST(InputWatch, AgeIsTheTimeSinceItWasFed)
+{
+  const Clock::time_point before = Clock::now();
+  InputWatch watch(0.02);
+  const Clock::time_point after = Clock::now();
+  ASSERT_TRUE(becomesStale(watch));
+  EXPECT_GE(watch.age(), 0.02);
+  const double shortest = since(after);
+  const double age = watch.age();
+  EXPECT_GE(age, shortest);
+  EXPECT_LE(age, since(before));
+  // Fed, it is no older than the moment before.
+  const Clock::time_point fed = Clock::now();
+  watch.feed();
+  EXPECT_LE(watch.age(), since(fed));
+}
+
 TEST(InputWatch, FreshInputMakesItGoodAgain)
 {
   // A machine that is busy may take longer than the timeout between two lines: then once more.

@@ -129,6 +129,14 @@ TEST(VelocityLimiter, StopIsAtOnce)
   EXPECT_NEAR(limiter.next({ 0.0, 0.2, 0.0 }, DT).y(), 0.5 * DT, 1e-12);
 }
 
+TEST(VelocityLimiter, NothingChangesInNoTime)
+{
+  VelocityLimiter limiter{ BaseLimits() };
+  EXPECT_EQ(limiter.next({ 0.2, 0.0, 0.0 }, 0.0), BaseVelocity(BaseVelocity::Zero()));
+  EXPECT_EQ(limiter.next({ 0.0, 0.0, 0.4 }, 0.0), BaseVelocity(BaseVelocity::Zero()));
+  EXPECT_EQ(limiter.next({ 0.2, 0.0, 0.4 }, 0.0), BaseVelocity(BaseVelocity::Zero()));
+}
+
 TEST(BaseLimits, NameAllFaultsAtOnce)
 {
   EXPECT_TRUE(BaseLimits().validate().empty());

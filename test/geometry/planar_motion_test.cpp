@@ -640,6 +640,15 @@ TEST(RefinePlanarPose, WhatDoesNotDetermineItLeavesItAsItWas)
   EXPECT_EQ(difference(refinePlanarPose({ -9.0, 0.0, 0.0 }, false_ones, WIDTH), { -9.0, 0.0, 0.0 }), 0.0);
 }
 
+TEST(RefinePlanarPose, OneSightingLeavesItAsItWas)
+{
+  // It has two coordinates for three unknowns.
+  const PlanarPose initial{ 0.5, 0.1, 0.2 };
+  Sighting one{ { { 0.1, 0.3 }, 0.5 }, project({ { 0.1, 0.3 }, 0.5 }, initial) };
+  one.current += Eigen::Vector2d(0.003, -0.002);
+  EXPECT_EQ(difference(refinePlanarPose(initial, { one }, WIDTH), initial), 0.0);
+}
+
 TEST(RefinePlanarMotion, FindsTheMinimumOfTheSampsonDistances)
 {
   Rng rng(7);

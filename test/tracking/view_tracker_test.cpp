@@ -324,6 +324,42 @@ TEST_F(ViewTrackerTest, RecoversThePoseFromAWrongPrediction)
   }
 }
 
+TEST_F(ViewTrackerTest, RecoversThePoseFromAPredictionThatIsFarOff)
+{
+  // The optical flow follows 15 px: what a turn at 0.4 rad/s is off by when image and odometry are 75 ms apart.
+  const ViewTracker tracker = desk().tracker();
+  const PlanarPose here = desk().nearIt();
+  const PlanarPose truth = desk().truth(here);
+  for (const double yaw : { -0.03, -0.02, 0.02, 0.03 })
+  {
+    const auto result = tracker.track(desk().image(here), { truth.x, truth.y, truth.yaw + yaw });
+    EXPECT_TRUE(result.found) << yaw;
+    EXPECT_LT(std::abs(wrapAngle(result.pose.yaw - truth.yaw)), 0.15 * DEGREE) << yaw;
+  }
+}
+
+TEST_F(ViewTrackerTest, FindsNoWrongPose)
+{
+  const ViewTracker tracker = desk().tracker();
+  int found = 0;
+  for (const PlanarPose& here :
+       { desk().baseBefore(0.6, 0.25, 0.06), desk().baseBefore(0.4, -0.2, -0.08), desk().nearIt() })
+  {
+    const PlanarPose truth = desk().truth(here);
+    for (const double y : { -0.15, -0.1, -0.06, 0.0, 0.06, 0.1, 0.15 })
+    {
+      const auto result = tracker.track(desk().image(here), { truth.x, truth.y + y, truth.yaw });
+      if (result.found)
+      {
+        ++found;
+        EXPECT_LT(std::hypot(result.pose.x - truth.x, result.pose.y - truth.y), 0.02) << truth.x << ", " << y;
+        EXPECT_LT(std::abs(wrapAngle(result.pose.yaw - truth.yaw)), 0.3 * DEGREE) << truth.x << ", " << y;
+      }
+    }
+  }
+  EXPECT_GE(found, 3);
+}
+
 TEST_F(ViewTrackerTest, IsExactAtTheView)
 {
   const ViewTracker tracker = desk().tracker();

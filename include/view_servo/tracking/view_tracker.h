@@ -102,7 +102,8 @@ private:
   Eigen::Vector2d levelOf(const Eigen::Vector2d& pixel) const;
   bool insideReference(const Eigen::Vector2d& pixel) const;
   const Point* nearest(const Eigen::Vector2d& level_point) const;
-  Result fit(const std::vector<Sighting>& sightings, const PlanarPose& initial) const;
+  /** The pose that most of them agree with, to that residual [px]. */
+  Result fit(const std::vector<Sighting>& sightings, double max_residual) const;
 
   Camera camera_;
   CameraMount mount_;
