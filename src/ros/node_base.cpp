@@ -3,6 +3,11 @@
 #include "view_servo/ros/node_base.h"
 
 #include <algorithm>
+#include <cstdlib>  // says whether this is glibc
+
+#ifdef __GLIBC__
+#include <malloc.h>
+#endif
 
 namespace view_servo
 {
@@ -23,6 +28,16 @@ std::string oneLine(const std::exception& error)
   }
   std::replace(text.begin(), text.end(), '\n', ' ');
   return text;
+}
+
+void keepFreedMemory()
+{
+#ifdef __GLIBC__
+  constexpr int LARGEST_BLOCK = 32 << 20;  // taken from the heap, which is kept [bytes]
+  constexpr int KEPT = 256 << 20;          // at the heap's end [bytes]
+  mallopt(M_MMAP_THRESHOLD, LARGEST_BLOCK);
+  mallopt(M_TRIM_THRESHOLD, KEPT);
+#endif
 }
 
 }  // namespace view_servo

@@ -236,6 +236,9 @@ ViewTracker::Result ViewTracker::fit(const std::vector<Sighting>& sightings, dou
   RansacParams ransac_params;
   ransac_params.inlier_threshold = max_residual / focal;
   ransac_params.sampling = Sampling::UNIFORM;
+  // The refinement below takes the rest of the way.
+  ransac_params.min_iterations = 20;
+  ransac_params.local_optimizations = 1;
   Rng rng(1);
   const auto found = ransac(PlanarPoseEstimator(sightings, ransac_params.inlier_threshold), ransac_params, rng);
   if (!found.model)

@@ -63,7 +63,8 @@ TEST(InputWatch, AgeIsTheTimeSinceItWasFed)
   // Fed, it is no older than the moment before.
   const Clock::time_point fed = Clock::now();
   watch.feed();
-  EXPECT_LE(watch.age(), since(fed));
+  const double new_age = watch.age();
+  EXPECT_LE(new_age, since(fed));
 }
 
 TEST(InputWatch, FreshInputMakesItGoodAgain)

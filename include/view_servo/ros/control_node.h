@@ -86,6 +86,7 @@ int runControlNode(int argc, char** argv, const std::string& name)
   constexpr std::uint32_t SPINNER_THREADS = 4;
   const ros::WallDuration poll(0.01);
   const ros::WallDuration flush(0.1);  // for the last command to leave
+  keepFreedMemory();
   ros::init(argc, argv, name, ros::init_options::NoSigintHandler);
   const ros::NodeHandle nh;
   detail::deferShutdown();

@@ -21,6 +21,12 @@ namespace view_servo
 std::string oneLine(const std::exception& error);
 
 /**
+ * Lets the process keep the memory that it has freed. Images come and go with every cycle; to ask the system for them
+ * each time costs a third of the time that it takes to work on them. Does nothing where the C library is not glibc.
+ */
+void keepFreedMemory();
+
+/**
  * What all nodes share: handles, services that answer whatever happens, and `/diagnostics` once a second of wall time,
  * so that it goes on when a bag's clock does not.
  */
@@ -73,6 +79,7 @@ template <typename Node>
 int runNode(int argc, char** argv, const std::string& name)
 {
   constexpr std::uint32_t SPINNER_THREADS = 3;
+  keepFreedMemory();
   ros::init(argc, argv, name);
   const ros::NodeHandle nh;  // outlives the node: without any handle, ROS ends and the last words are lost
   try
