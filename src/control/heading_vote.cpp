@@ -29,8 +29,7 @@ std::vector<double> smoothed(const std::vector<double>& votes, double sd)
   {
     for (int k = std::max(0, i - reach); k <= std::min(count - 1, i + reach); ++k)
     {
-      result[static_cast<std::size_t>(i)] +=
-          kernel[static_cast<std::size_t>(k - i + reach)] / sum * votes[static_cast<std::size_t>(k)];
+      result[static_cast<std::size_t>(i)] += kernel.begin()[k - i + reach] / sum * votes[static_cast<std::size_t>(k)];
     }
   }
   return result;
