@@ -31,17 +31,6 @@ std::vector<std::string> RansacParams::validate() const
 
 namespace detail
 {
-void drawDistinct(Rng& rng, std::size_t count, std::size_t size, std::vector<int>& sample)
-{
-  sample.clear();
-  for (std::size_t last = count - size; last < count; ++last)
-  {
-    const int index = static_cast<int>(uniformIndex(rng, last + 1));
-    const bool taken = std::find(sample.begin(), sample.end(), index) != sample.end();
-    sample.push_back(taken ? static_cast<int>(last) : index);
-  }
-}
-
 std::vector<int> randomOrder(Rng& rng, std::size_t count)
 {
   std::vector<int> order(count);
@@ -60,43 +49,6 @@ void SequentialTest::setBest(double inlier_ratio)
   const double good = std::min(inlier_ratio, MAX_RATIO);
   inlier_evidence_ = good > 0.0 ? std::log(FAILING) : 0.0;
   outlier_evidence_ = std::log((1.0 - FAILING * good) / (1.0 - good));
-}
-
-Sampler::Sampler(Sampling sampling, std::size_t count, std::size_t size, double schedule_length)
-  : count_(count),
-    size_(size),
-    prefix_(sampling == Sampling::PROGRESSIVE ? size : count),
-    prefix_samples_(schedule_length),
-    samples_drawn_(0.0),
-    samples_to_grow_(1.0)
-{
-  // T_m = T_N prod (m - i) / (N - i), the samples out of T_N that fall into the first m data.
-  for (std::size_t i = 0; i < size; ++i)
-  {
-    prefix_samples_ *= static_cast<double>(size - i) / static_cast<double>(count - i);
-  }
-}
-
-void Sampler::draw(Rng& rng, std::vector<int>& sample)
-{
-  if (prefix_ >= count_)
-  {
-    drawDistinct(rng, count_, size_, sample);
-    return;
-  }
-  samples_drawn_ += 1.0;
-  if (samples_drawn_ > samples_to_grow_)
-  {
-    // T_n+1 = T_n (n + 1) / (n + 1 - m), T'_n+1 = T'_n + ceil(T_n+1 - T_n)
-    const double n = static_cast<double>(prefix_);
-    const double grown = prefix_samples_ * (n + 1.0) / (n + 1.0 - static_cast<double>(size_));
-    samples_to_grow_ += std::ceil(grown - prefix_samples_);
-    prefix_samples_ = grown;
-    ++prefix_;
-  }
-  // Samples without the newest datum were drawn while the prefix was shorter: it is in every one of these.
-  drawDistinct(rng, prefix_ - 1, size_ - 1, sample);
-  sample.push_back(static_cast<int>(prefix_ - 1));
 }
 
 double requiredSamples(double inlier_ratio, int sample_size, double confidence)

@@ -73,7 +73,7 @@ std::vector<Trial> trials(const ViewMatcherParams& params)
 struct Fit
 {
   Eigen::Matrix3d matrix;
-  std::vector<int> inliers;
+  std::vector<Association> inliers;
 };
 
 /** What differs between the two models. Errors are squared, as in robust/. */
@@ -85,22 +85,47 @@ public:
   {
   }
 
-  /** Robust fit to correspondences: the matrix and the indices of the inliers; empty when no sample gave one. */
-  std::optional<Fit> estimate(const Correspondences& pairs, RansacStatistics& statistics, Rng& rng) const
+  /** Robust fit to one-to-one candidates between two lists of points; empty when no sample gave one. */
+  std::optional<Fit> estimate(const std::vector<Association>& candidates, const Correspondences& pairs,
+                              RansacStatistics& statistics, Rng& rng) const
   {
-    RansacParams ransac_params = params_.ransac;
-    ransac_params.inlier_threshold = threshold_;
+    const RansacParams ransac_params = ransacParams();
+    const auto to_fit = [&](const Eigen::Matrix3d& matrix, const std::vector<int>& inliers) {
+      Fit fit{ matrix, {} };
+      for (const int i : inliers)
+      {
+        fit.inliers.push_back(candidates[static_cast<std::size_t>(i)]);
+      }
+      return fit;
+    };
     if (model_ == GeometryModel::HOMOGRAPHY)
     {
-      auto result = ransac(HomographyEstimator(pairs), ransac_params, rng);
+      const auto result = ransac(HomographyEstimator(pairs), ransac_params, rng);
       statistics = result.statistics;
-      return result.model ? std::optional<Fit>({ result.model->h, std::move(result.inliers) }) : std::nullopt;
+      return result.model ? std::optional<Fit>(to_fit(result.model->h, result.inliers)) : std::nullopt;
     }
-    const double view_threshold =
-        params_.view_consistency == ViewConsistency::WITHIN ? params_.consistency.threshold : 0.0;
-    auto result = ransac(FundamentalEstimator(pairs, view_threshold), ransac_params, rng);
+    const auto result = ransac(FundamentalEstimator(pairs, viewThreshold()), ransac_params, rng);
     statistics = result.statistics;
-    return result.model ? std::optional<Fit>({ *result.model, std::move(result.inliers) }) : std::nullopt;
+    return result.model ? std::optional<Fit>(to_fit(*result.model, result.inliers)) : std::nullopt;
+  }
+
+  /** The same from all associations (thesis ch. 9). */
+  std::optional<Fit> estimate(const AssociationMatrix& association, const Points& reference, const Points& current,
+                              RansacStatistics& statistics, Rng& rng) const
+  {
+    MultiHypothesisParams hypotheses = params_.hypotheses;
+    hypotheses.sampling = params_.estimator == GeometryEstimator::IMPORTANCE ? HypothesisSampling::IMPORTANCE
+                                                                             : HypothesisSampling::CANDIDATES;
+    if (model_ == GeometryModel::HOMOGRAPHY)
+    {
+      auto result = estimateHomography(association, reference, current, ransacParams(), hypotheses, rng);
+      statistics = result.statistics;
+      return result.model ? std::optional<Fit>({ result.model->h, std::move(result.matches) }) : std::nullopt;
+    }
+    auto result =
+        estimateFundamental(association, reference, current, ransacParams(), hypotheses, rng, viewThreshold());
+    statistics = result.statistics;
+    return result.model ? std::optional<Fit>({ *result.model, std::move(result.matches) }) : std::nullopt;
   }
 
   /** Probability that a match made by chance, anywhere in the image, agrees with a model. */
@@ -146,6 +171,19 @@ public:
   }
 
 private:
+  RansacParams ransacParams() const
+  {
+    RansacParams ransac_params = params_.ransac;
+    ransac_params.inlier_threshold = threshold_;
+    return ransac_params;
+  }
+
+  /** Of the samples for F. */
+  double viewThreshold() const
+  {
+    return params_.view_consistency == ViewConsistency::WITHIN ? params_.consistency.threshold : 0.0;
+  }
+
   GeometryModel model_;
   const ViewMatcherParams& params_;
   double threshold_;
@@ -199,6 +237,29 @@ struct Match
   double score;
 };
 
+Points positions(const std::vector<Corner>& corners)
+{
+  Points result;
+  result.reserve(corners.size());
+  for (const Corner& corner : corners)
+  {
+    result.push_back(corner.position);
+  }
+  return result;
+}
+
+template <typename T>
+std::vector<T> chosen(const std::vector<T>& values, const std::vector<int>& indices)
+{
+  std::vector<T> result;
+  result.reserve(indices.size());
+  for (const int i : indices)
+  {
+    result.push_back(values[static_cast<std::size_t>(i)]);
+  }
+  return result;
+}
+
 /** One comparison of two levels: candidates and, if they support one, the geometry. */
 class Attempt
 {
@@ -227,29 +288,27 @@ public:
   {
     association_ = associatePoints(from_, reference_.profileIndex(levels_.reference), to_, params_.points);
     clock.finish("association");
+    std::vector<Association> candidates = candidateMatches(association_, params_.points.assignment);
     Correspondences pairs;
-    for (const Association& candidate : candidateMatches(association_, params_.points.assignment))
+    for (const Association& candidate : candidates)
     {
-      candidates_.push_back(
-          { candidate.row, to_.corners[static_cast<std::size_t>(candidate.column)].position, candidate.weight });
+      candidates_.push_back(toMatch(candidate));
       pairs.push_back(correspondence(candidates_.back()));
     }
     clock.finish("assignment");
     if (params_.view_consistency == ViewConsistency::BEFORE)
     {
-      std::vector<Match> kept;
-      Correspondences kept_pairs;
-      for (const int i : viewConsistentCandidates(pairs, params_.consistency, rng))
-      {
-        kept.push_back(candidates_[static_cast<std::size_t>(i)]);
-        kept_pairs.push_back(pairs[static_cast<std::size_t>(i)]);
-      }
-      candidates_ = std::move(kept);
-      pairs = std::move(kept_pairs);
+      const std::vector<int> kept = viewConsistentCandidates(pairs, params_.consistency, rng);
+      candidates = chosen(candidates, kept);
+      candidates_ = chosen(candidates_, kept);
+      pairs = select(pairs, kept);
       clock.finish("view_consistency");
     }
 
-    const std::optional<Fit> fit = geometry_.estimate(pairs, result.ransac, rng);
+    const bool one_hypothesis = params_.estimator == GeometryEstimator::RANSAC;
+    const std::optional<Fit> fit = one_hypothesis ? geometry_.estimate(candidates, pairs, result.ransac, rng)
+                                                  : geometry_.estimate(association_, positions(from_.corners),
+                                                                       positions(to_.corners), result.ransac, rng);
     clock.finish("ransac");
     result.log_significance = 0.0;
     if (!fit)
@@ -257,16 +316,20 @@ public:
       return false;
     }
     Correspondences supporting;
-    for (const int i : fit->inliers)
+    for (const Association& match : fit->inliers)
     {
-      inliers_.push_back(candidates_[static_cast<std::size_t>(i)]);
-      supporting.push_back(pairs[static_cast<std::size_t>(i)]);
+      inliers_.push_back(toMatch(match));
+      supporting.push_back(correspondence(inliers_.back()));
     }
     const double among = chanceAmong(supporting.size(), [&](std::size_t reference, std::size_t current) {
       return geometry_.agrees(fit->matrix, { supporting[reference].reference, supporting[current].current });
     });
     const double chance = std::max(geometry_.chance(current_.image(levels_.current).size()), among);
-    result.log_significance = logSignificance(pairs.size(), supporting.size(), geometry_.sampleSize(), chance);
+    // Also of several hypotheses the one-to-one candidates judge: they were chosen without regard to the geometry.
+    const auto agreeing = std::count_if(
+        pairs.begin(), pairs.end(), [&](const Correspondence& pair) { return geometry_.agrees(fit->matrix, pair); });
+    result.log_significance =
+        logSignificance(pairs.size(), static_cast<std::size_t>(agreeing), geometry_.sampleSize(), chance);
     if (result.log_significance < min_significance_ || !keepsOrientation(supporting))
     {
       inliers_.clear();
@@ -355,6 +418,11 @@ public:
   }
 
 private:
+  Match toMatch(const Association& association) const
+  {
+    return { association.row, to_.corners[static_cast<std::size_t>(association.column)].position, association.weight };
+  }
+
   Correspondence correspondence(const Match& match) const
   {
     return { from_.corners[static_cast<std::size_t>(match.row)].position, match.current };
@@ -396,8 +464,7 @@ private:
     for (const Association& match : maximumWeightMatching(
              associateAlongFundamental(association_, from_.corners, to_.corners, matrix_, geometry_.threshold())))
     {
-      matches.push_back({ match.row, to_.corners[static_cast<std::size_t>(match.column)].position,
-                          association_.weight(match.row, match.column) });
+      matches.push_back(toMatch({ match.row, match.column, association_.weight(match.row, match.column) }));
     }
     return matches;
   }
@@ -422,9 +489,13 @@ std::vector<std::string> ViewMatcherParams::validate() const
 {
   std::vector<std::string> faults;
   for (const std::vector<std::string>& more :
-       { points.validate(), ransac.validate(), consistency.validate(), guidance.validate() })
+       { points.validate(), ransac.validate(), hypotheses.validate(), consistency.validate(), guidance.validate() })
   {
     faults.insert(faults.end(), more.begin(), more.end());
+  }
+  if (view_consistency == ViewConsistency::BEFORE && estimator != GeometryEstimator::RANSAC)
+  {
+    faults.emplace_back("view_consistency before filters candidates, which only estimator ransac keeps to");
   }
   if (!(min_log_significance >= 0.0))
   {

@@ -224,7 +224,7 @@ TEST(RandomOrder, IsAPermutationWithEveryPlaceEquallyLikely)
 TEST(Sampler, ProgressiveStartsWithTheBestAndGrows)
 {
   Rng rng(6);
-  detail::Sampler sampler(Sampling::PROGRESSIVE, 100, 4, 1000.0);
+  ListSampler sampler(Sampling::PROGRESSIVE, 100, 4, 1000.0);
   std::vector<int> sample;
   sampler.draw(rng, sample);
   EXPECT_EQ(std::set<int>(sample.begin(), sample.end()), (std::set<int>{ 0, 1, 2, 3 }));
@@ -247,7 +247,7 @@ TEST(Sampler, ProgressiveGrowthFollowsTheSchedule)
     return 500.0 * n * (n - 1) / (50.0 * 49.0);
   };
   Rng rng(7);
-  detail::Sampler sampler(Sampling::PROGRESSIVE, 50, 2, 500.0);
+  ListSampler sampler(Sampling::PROGRESSIVE, 50, 2, 500.0);
   std::vector<int> sample;
   std::map<int, int> drawn;
   for (int i = 0; i < 300; ++i)
@@ -265,7 +265,7 @@ TEST(Sampler, ProgressiveGrowthFollowsTheSchedule)
 TEST(Sampler, UniformOnceTheScheduleIsThrough)
 {
   Rng rng(8);
-  detail::Sampler sampler(Sampling::PROGRESSIVE, 10, 2, 20.0);
+  ListSampler sampler(Sampling::PROGRESSIVE, 10, 2, 20.0);
   std::vector<int> sample;
   for (int i = 0; i < 50; ++i)
   {

@@ -14,10 +14,13 @@
 
 #include <cmath>
 #include <limits>
+#include <set>
 #include <stdexcept>
+#include <utility>
 
 namespace
 {
+using view_servo::GeometryEstimator;
 using view_servo::GeometryModel;
 using view_servo::MatchedPoint;
 using view_servo::MatchOutcome;
@@ -34,6 +37,14 @@ using view_servo::test::texturedPicture;
 using view_servo::test::warpedPicture;
 
 const cv::Size SIZE(480, 360);
+
+/** A plane seen from far to the side. */
+Eigen::Matrix3d steepHomography()
+{
+  Eigen::Matrix3d steep;
+  steep << 0.45, 0.02, 90.0, -0.1, 0.85, 40.0, -6e-4, 1e-4, 1.0;
+  return steep;
+}
 
 ViewMatch matchImages(const ViewMatcherParams& params, const cv::Mat& reference, const cv::Mat& current,
                       GeometryModel model = GeometryModel::HOMOGRAPHY, const cv::Rect& region = cv::Rect())
@@ -115,8 +126,7 @@ TEST(ViewMatcher, FindsThePlaneToAFractionOfAPixel)
 TEST(ViewMatcher, GuidedMatchingFindsMore)
 {
   const cv::Mat reference = blotchedPicture(2, 2.0);
-  Eigen::Matrix3d steep;
-  steep << 0.45, 0.02, 90.0, -0.1, 0.85, 40.0, -6e-4, 1e-4, 1.0;
+  const Eigen::Matrix3d steep = steepHomography();
   const cv::Mat current = disturbed(warpedPicture(reference, steep, SIZE), 0.7, 10.0, 4.0);
   ViewMatcherParams params;
   const ViewMatch guided = matchImages(params, reference, current);
@@ -146,6 +156,48 @@ TEST(ViewMatcher, FindsEpipolarGeometryOfASceneWithDepth)
     }
     EXPECT_GT(right, match.inliers * 8 / 10);
   }
+}
+
+TEST(ViewMatcher, SeveralHypothesesFindTheSameGeometryFromMoreMatches)
+{
+  const cv::Mat reference = blotchedPicture(2, 2.0);
+  const cv::Mat current = disturbed(warpedPicture(reference, steepHomography(), SIZE), 0.7, 10.0, 4.0);
+  const Book book;
+  ViewMatcherParams params;
+  params.guided = false;
+  const ViewMatch plane = matchImages(params, reference, current);
+  const ViewMatch pages = matchImages(params, book.reference, book.current, GeometryModel::FUNDAMENTAL);
+  ASSERT_EQ(plane.outcome, MatchOutcome::MATCHED);
+  ASSERT_EQ(pages.outcome, MatchOutcome::MATCHED);
+  for (const GeometryEstimator estimator : { GeometryEstimator::MULTI_HYPOTHESIS, GeometryEstimator::IMPORTANCE })
+  {
+    params.estimator = estimator;
+    params.ransac.max_iterations = estimator == GeometryEstimator::IMPORTANCE ? 20000 : 2000;
+    const ViewMatch several = matchImages(params, reference, current);
+    ASSERT_EQ(several.outcome, MatchOutcome::MATCHED) << several.message;
+    EXPECT_LT(cornerError(several.matrix, steepHomography(), SIZE), 3.0);
+    EXPECT_GT(several.inliers, plane.inliers);
+    const ViewMatch of_pages = matchImages(params, book.reference, book.current, GeometryModel::FUNDAMENTAL);
+    ASSERT_EQ(of_pages.outcome, MatchOutcome::MATCHED) << of_pages.message;
+    EXPECT_GE(of_pages.inliers, pages.inliers);
+    std::set<std::pair<double, double>> used;
+    for (const MatchedPoint& point : of_pages.matches)
+    {
+      if (point.inlier)
+      {
+        EXPECT_TRUE(used.insert({ point.position.current.x(), point.position.current.y() }).second);
+      }
+    }
+  }
+}
+
+TEST(ViewMatcherParams, FilteringCandidatesNeedsAnEstimatorThatKeepsToThem)
+{
+  ViewMatcherParams params;
+  params.view_consistency = ViewConsistency::BEFORE;
+  EXPECT_TRUE(params.validate().empty());
+  params.estimator = GeometryEstimator::MULTI_HYPOTHESIS;
+  EXPECT_EQ(params.validate().size(), 1U);
 }
 
 TEST(ViewMatcher, WorksWithUniformSamplingAndWithoutLocalOptimisation)

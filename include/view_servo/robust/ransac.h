@@ -2,21 +2,16 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include "view_servo/robust/consensus.h"
 #include "view_servo/robust/random.h"
+#include "view_servo/robust/sampler.h"
 
-#include <cstddef>
 #include <optional>
 #include <string>
 #include <vector>
 
 namespace view_servo
 {
-enum class Sampling
-{
-  UNIFORM,     ///< every datum equally likely
-  PROGRESSIVE  ///< from the best-first prefix, growing (PROSAC, Chum & Matas 2005); data must be sorted best first
-};
-
 /** Options of the one RANSAC loop. */
 struct RansacParams
 {
@@ -26,7 +21,7 @@ struct RansacParams
   int max_iterations = 2000;       ///< random samples solved at most, >= 1
   int max_rejected = 50000;        ///< samples the estimator's cheap test may refuse in all (one more ends it), >= 0
   int local_optimizations = 10;    ///< refits to the inliers of a new best model (Chum, Matas & Kittler 2003), 0 = off
-  bool improvement_stage = false;  ///< thesis 9.4: replace each datum of the best sample by every other one in turn
+  bool improvement_stage = false;  ///< thesis 9.4: replace each datum of the best sample by others in turn
   Sampling sampling = Sampling::PROGRESSIVE;
 
   /** All faults, one a line; empty when the parameters are usable. */
@@ -56,7 +51,7 @@ struct RansacResult
 {
   std::optional<Model> model;  ///< empty: no sample gave a model
   std::vector<int> inliers;    ///< indices of the data within the threshold, ascending
-  double cost = 0.0;           ///< sum over all data of min(error², threshold²) (MSAC) [px²]
+  double cost = 0.0;           ///< of the consensus; MSAC: sum over all data of min(error², threshold²) [px²]
   RansacStatistics statistics;
 };
 
@@ -76,6 +71,12 @@ struct RansacResult
  */
 template <typename Estimator>
 RansacResult<typename Estimator::Model> ransac(const Estimator& estimator, const RansacParams& params, Rng& rng);
+
+/** The same with samples from elsewhere and support measured otherwise; params.sampling has no meaning then. */
+template <typename Estimator>
+RansacResult<typename Estimator::Model> ransac(const Estimator& estimator, Sampler& sampler,
+                                               Consensus<typename Estimator::Model>& consensus,
+                                               const RansacParams& params, Rng& rng);
 
 }  // namespace view_servo
 

@@ -6,6 +6,7 @@
 #include "view_servo/geometry/line_segment.h"
 #include "view_servo/matching/guided_matching.h"
 #include "view_servo/matching/point_matcher.h"
+#include "view_servo/robust/multi_hypothesis.h"
 #include "view_servo/robust/ransac.h"
 #include "view_servo/robust/view_consistency.h"
 #include "view_servo/views/prepared_image.h"
@@ -29,8 +30,16 @@ enum class GeometryModel
 enum class ViewConsistency
 {
   OFF,
-  BEFORE,  ///< method 1: candidates are filtered
+  BEFORE,  ///< method 1: candidates are filtered; for GeometryEstimator::RANSAC
   WITHIN   ///< method 2: samples are tested
+};
+
+/** How a geometry is found in an association (thesis ch. 9). */
+enum class GeometryEstimator
+{
+  RANSAC,            ///< one candidate a point
+  MULTI_HYPOTHESIS,  ///< samples from the candidates, support from all associations: the modified algorithm (9.5.1)
+  IMPORTANCE         ///< samples and support from all associations: Algorithm 2, which takes many iterations
 };
 
 /** Options of the whole way from two images to their geometry. */
@@ -38,6 +47,8 @@ struct ViewMatcherParams
 {
   PointMatcherParams points;
   RansacParams ransac;
+  GeometryEstimator estimator = GeometryEstimator::RANSAC;
+  MultiHypothesisParams hypotheses;  ///< `sampling` is chosen by `estimator`
   ViewConsistency view_consistency = ViewConsistency::WITHIN;
   ViewConsistencyParams consistency;
   bool guided = true;  ///< look for more matches along the geometry found

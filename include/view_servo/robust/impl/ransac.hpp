@@ -13,9 +13,6 @@ namespace view_servo
 {
 namespace detail
 {
-/** Replaces `sample` by `size` distinct indices in [0, count), every set equally likely (Floyd). size <= count. */
-void drawDistinct(Rng& rng, std::size_t count, std::size_t size, std::vector<int>& sample);
-
 /** The indices [0, count), every order equally likely (Fisher & Yates). */
 std::vector<int> randomOrder(Rng& rng, std::size_t count);
 
@@ -44,29 +41,69 @@ private:
   double outlier_evidence_ = 0.0;
 };
 
-/**
- * Samples for RANSAC: uniform, or from a growing best-first prefix (PROSAC; Chum & Matas 2005, sec. 2.1). The growth
- * is that of the paper with its T_N set to `schedule_length`; when it is through, samples are uniform over all data.
- */
-class Sampler
-{
-public:
-  /** size <= count, size > 0. */
-  Sampler(Sampling sampling, std::size_t count, std::size_t size, double schedule_length);
-
-  void draw(Rng& rng, std::vector<int>& sample);
-
-private:
-  std::size_t count_;
-  std::size_t size_;
-  std::size_t prefix_;      ///< n: samples come from the best n data
-  double prefix_samples_;   ///< T_n: samples expected from within the best n, real-valued
-  double samples_drawn_;    ///< t
-  double samples_to_grow_;  ///< T'_n: n grows when t passes it
-};
-
 /** Samples needed for one free of outliers with the given confidence (thesis eq. 9.5); possibly infinite. */
 double requiredSamples(double inlier_ratio, int sample_size, double confidence);
+
+/** Truncated squared errors of all data (MSAC, Torr & Zisserman 2000), in random order so that most models fail early. */
+template <typename Estimator>
+class MsacConsensus : public Consensus<typename Estimator::Model>
+{
+public:
+  using Model = typename Estimator::Model;
+
+  MsacConsensus(const Estimator& estimator, double threshold, Rng& rng)
+    : estimator_(estimator), squared_threshold_(threshold * threshold), order_(randomOrder(rng, estimator.size()))
+  {
+  }
+
+  /** NaN counts as an outlier. Without a limit, exact. */
+  double cost(const Model& model, double limit) override
+  {
+    const bool limited = std::isfinite(limit);
+    double cost = 0.0;
+    double evidence = 0.0;
+    for (const int i : order_)
+    {
+      const double error = estimator_.error(model, static_cast<std::size_t>(i));
+      const bool inlier = error < squared_threshold_;
+      cost += inlier ? error : squared_threshold_;
+      test_.add(inlier, evidence);
+      if (limited && (!(cost < limit) || SequentialTest::fails(evidence)))
+      {
+        return std::numeric_limits<double>::infinity();
+      }
+    }
+    return cost;
+  }
+
+  void findInliers(const Model& model, double width, std::vector<int>& inliers) override
+  {
+    inliers.clear();
+    for (std::size_t i = 0; i < estimator_.size(); ++i)
+    {
+      if (estimator_.error(model, i) <= width * width * squared_threshold_)
+      {
+        inliers.push_back(static_cast<int>(i));
+      }
+    }
+  }
+
+  void setBest(const std::vector<int>& inliers) override
+  {
+    test_.setBest(static_cast<double>(inliers.size()) / static_cast<double>(estimator_.size()));
+  }
+
+  double costOfNone() const override
+  {
+    return static_cast<double>(estimator_.size()) * squared_threshold_;
+  }
+
+private:
+  const Estimator& estimator_;
+  const double squared_threshold_;
+  const std::vector<int> order_;
+  SequentialTest test_;
+};
 
 /** The state of one call of ransac(). */
 template <typename Estimator>
@@ -75,11 +112,9 @@ class RansacLoop
 public:
   using Model = typename Estimator::Model;
 
-  RansacLoop(const Estimator& estimator, const RansacParams& params, Rng& rng)
-    : estimator_(estimator),
-      params_(params),
-      rng_(rng),
-      squared_threshold_(params.inlier_threshold * params.inlier_threshold)
+  RansacLoop(const Estimator& estimator, Sampler& sampler, Consensus<Model>& consensus, const RansacParams& params,
+             Rng& rng)
+    : estimator_(estimator), sampler_(sampler), consensus_(consensus), params_(params), rng_(rng)
   {
   }
 
@@ -88,7 +123,6 @@ public:
     const auto start = std::chrono::steady_clock::now();
     if (estimator_.size() >= SIZE)
     {
-      order_ = randomOrder(rng_, estimator_.size());
       statistics().stop = drawSamples();
       if (params_.improvement_stage && result_.model)
       {
@@ -97,11 +131,11 @@ public:
     }
     if (result_.model)
     {
-      findInliers(*result_.model, squared_threshold_, result_.inliers);
+      consensus_.findInliers(*result_.model, 1.0, result_.inliers);
     }
     else
     {
-      result_.cost = static_cast<double>(estimator_.size()) * squared_threshold_;
+      result_.cost = consensus_.costOfNone();
     }
     statistics().elapsed_ms =
         std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - start).count();
@@ -118,8 +152,6 @@ private:
 
   RansacStop drawSamples()
   {
-    // Half of the samples allowed for the growth: an order that misleads leaves the other half to uniform sampling.
-    Sampler sampler(params_.sampling, estimator_.size(), SIZE, 0.5 * params_.max_iterations);
     std::vector<int> sample;
     double required = std::numeric_limits<double>::infinity();
     while (statistics().iterations < params_.max_iterations)
@@ -128,7 +160,10 @@ private:
       {
         return RansacStop::CONFIDENCE_REACHED;
       }
-      sampler.draw(rng_, sample);
+      if (!sampler_.draw(rng_, sample))
+      {
+        return RansacStop::TOO_FEW_DATA;
+      }
       if (!estimator_.accepts(sample))
       {
         if (++statistics().rejected_samples > params_.max_rejected)
@@ -140,28 +175,26 @@ private:
       ++statistics().iterations;
       if (trySample(sample))
       {
-        findInliers(*result_.model, squared_threshold_, inliers_);
-        required = requiredSamples(static_cast<double>(inliers_.size()) / static_cast<double>(estimator_.size()),
-                                   Estimator::SAMPLE_SIZE, params_.confidence);
+        consensus_.findInliers(*result_.model, 1.0, inliers_);
+        required = requiredSamples(sampler_.share(inliers_), Estimator::SAMPLE_SIZE, params_.confidence);
       }
     }
     return statistics().iterations >= required ? RansacStop::CONFIDENCE_REACHED : RansacStop::ITERATION_LIMIT;
   }
 
-  /** Thesis 9.4: each position of the best sample in turn takes every other datum; improvements are kept at once. */
+  /** Thesis 9.4: each position of the best sample in turn takes other data; improvements are kept at once. */
   void replaceSampleData()
   {
     std::vector<int> sample;
     for (std::size_t position = 0; position < SIZE; ++position)
     {
-      for (int datum = 0; datum < static_cast<int>(estimator_.size()); ++datum)
+      for (int trial = 0; trial < sampler_.replacements(); ++trial)
       {
-        if (std::find(best_sample_.begin(), best_sample_.end(), datum) != best_sample_.end())
+        sample = best_sample_;
+        if (!sampler_.replace(rng_, trial, position, sample))
         {
           continue;
         }
-        sample = best_sample_;
-        sample[position] = datum;
         if (estimator_.accepts(sample))
         {
           trySample(sample);
@@ -183,7 +216,7 @@ private:
     for (const Model& model : models_)
     {
       ++statistics().models;
-      const double cost = testAndScore(model);
+      const double cost = consensus_.cost(model, sample_cost_);
       if (cost < sample_cost_)
       {
         sample_cost_ = cost;
@@ -195,8 +228,8 @@ private:
       return false;
     }
     best_sample_ = sample;
-    findInliers(*best, squared_threshold_, inliers_);
-    test_.setBest(static_cast<double>(inliers_.size()) / static_cast<double>(estimator_.size()));
+    consensus_.findInliers(*best, 1.0, inliers_);
+    consensus_.setBest(inliers_);
     const bool improved = keepIfBetter(*best, sample_cost_);
     return optimizeLocally(*best) || improved;
   }
@@ -215,7 +248,7 @@ private:
     double last_cost = std::numeric_limits<double>::infinity();
     for (int i = 0; i < params_.local_optimizations; ++i)
     {
-      findInliers(model, width * width * squared_threshold_, inliers_);
+      consensus_.findInliers(model, width, inliers_);
       if (inliers_.size() < SIZE)
       {
         break;
@@ -227,7 +260,7 @@ private:
       }
       model = *refitted;
       ++statistics().models;
-      const double cost = score(model);
+      const double cost = consensus_.cost(model, std::numeric_limits<double>::infinity());
       if (keepIfBetter(model, cost))
       {
         ++statistics().local_optimizations;
@@ -254,56 +287,12 @@ private:
     return true;
   }
 
-  /** MSAC cost. NaN counts as an outlier. */
-  double score(const Model& model) const
-  {
-    double cost = 0.0;
-    for (std::size_t i = 0; i < estimator_.size(); ++i)
-    {
-      const double error = estimator_.error(model, i);
-      cost += error < squared_threshold_ ? error : squared_threshold_;
-    }
-    return cost;
-  }
-
-  /** As score(), but infinite as soon as the model is seen not to beat the best sample. */
-  double testAndScore(const Model& model) const
-  {
-    double cost = 0.0;
-    double evidence = 0.0;
-    for (const int i : order_)
-    {
-      const double error = estimator_.error(model, static_cast<std::size_t>(i));
-      const bool inlier = error < squared_threshold_;
-      cost += inlier ? error : squared_threshold_;
-      test_.add(inlier, evidence);
-      if (!(cost < sample_cost_) || SequentialTest::fails(evidence))
-      {
-        return std::numeric_limits<double>::infinity();
-      }
-    }
-    return cost;
-  }
-
-  void findInliers(const Model& model, double squared_threshold, std::vector<int>& inliers) const
-  {
-    inliers.clear();
-    for (std::size_t i = 0; i < estimator_.size(); ++i)
-    {
-      if (estimator_.error(model, i) <= squared_threshold)
-      {
-        inliers.push_back(static_cast<int>(i));
-      }
-    }
-  }
-
   const Estimator& estimator_;
+  Sampler& sampler_;
+  Consensus<Model>& consensus_;
   const RansacParams& params_;
   Rng& rng_;
-  const double squared_threshold_;
   RansacResult<Model> result_;
-  std::vector<int> order_;  ///< in which data are scored
-  SequentialTest test_;
   std::vector<int> best_sample_;
   double sample_cost_ = std::numeric_limits<double>::infinity();  ///< of the best sample, before local optimisation
   std::vector<Model> models_;                                     ///< of one sample
@@ -315,7 +304,18 @@ private:
 template <typename Estimator>
 RansacResult<typename Estimator::Model> ransac(const Estimator& estimator, const RansacParams& params, Rng& rng)
 {
-  return detail::RansacLoop<Estimator>(estimator, params, rng).run();
+  detail::MsacConsensus<Estimator> consensus(estimator, params.inlier_threshold, rng);
+  // Half of the samples allowed for the growth: an order that misleads leaves the other half to uniform sampling.
+  ListSampler sampler(params.sampling, estimator.size(), Estimator::SAMPLE_SIZE, 0.5 * params.max_iterations);
+  return ransac(estimator, sampler, consensus, params, rng);
+}
+
+template <typename Estimator>
+RansacResult<typename Estimator::Model> ransac(const Estimator& estimator, Sampler& sampler,
+                                               Consensus<typename Estimator::Model>& consensus,
+                                               const RansacParams& params, Rng& rng)
+{
+  return detail::RansacLoop<Estimator>(estimator, sampler, consensus, params, rng).run();
 }
 
 }  // namespace view_servo
