@@ -5,8 +5,11 @@
  * Re-runs the thesis' experiments on this implementation: `experiments NAME [--out DIR]` writes NAME.csv, and NAME.png
  * beside it, drawn by plot_experiment; `--list` names them. Those that need real images read them from VIEW_SERVO_DATA.
  */
+#include "cyclic_order_experiment.h"
 #include "homing_experiments.h"
+#include "hypothesis_experiments.h"
 #include "line_ground_truth.h"
+#include "profile_experiments.h"
 #include "view_servo/features/line_segments.h"
 #include "view_servo/geometry/line_homography.h"
 #include "view_servo/matching/assignment.h"
@@ -96,8 +99,15 @@ void linesTable(const ExperimentContext& context, std::ostream& csv)
   constexpr double FINE = 1.0;    // [px]
   constexpr double COARSE = 2.0;  // [px]
   std::vector<LinePair> pairs = readBenchmarkPairs(data, { "dunster", "building_viewpoint" });
-  pairs.push_back(readMertonPair(data, 1, 2));
-  pairs.push_back(readMertonPair(data, 1, 3));
+  if (context.brief)
+  {
+    pairs.resize(1);
+  }
+  else
+  {
+    pairs.push_back(readMertonPair(data, 1, 2));
+    pairs.push_back(readMertonPair(data, 1, 3));
+  }
   csv << "pair,order,scale,groups,max_distance,segments_reference,segments_current,top25,top50\n";
   for (const LinePair& pair : pairs)
   {
@@ -166,6 +176,14 @@ const std::vector<Experiment>& experiments()
     { "lines_table", "tables 4.1 and 4.2: line matching by pairs and triplets", true, linesTable },
     { "homing", "chapter 5: homing in simulated rooms, from many starts", false, runHomingExperiment },
     { "homing_directions", "the heading between real views of a room", true, runDirectionsExperiment },
+    { "multi_hypothesis", "table 9.1, figures 9.1 to 9.6: several hypotheses a point, simulated", false,
+      runMultiHypothesisExperiment },
+    { "real_pairs", "figures 9.7 to 9.10: several hypotheses a point, real images", true, runRealPairsExperiment },
+    { "profiles_parameters", "figures 6.8 to 6.10: parameters of intensity profiles", true,
+      runProfileParametersExperiment },
+    { "view_consistency", "tables 6.2 and 6.3: the view constraint before and within RANSAC", true,
+      runViewConsistencyExperiment },
+    { "cyclic_order", "figures 7.5 to 7.11: cyclic order against plain votes", false, runCyclicOrderExperiment },
   };
   return all;
 }

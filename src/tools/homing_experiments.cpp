@@ -3,6 +3,7 @@
 #include "homing_experiments.h"
 
 #include "package_folder.h"
+#include "parallel.h"
 #include "sim/homing_trial.h"
 #include "view_servo/control/heading_hypotheses.h"
 #include "view_servo/geometry/camera.h"
@@ -17,10 +18,8 @@
 
 #include <algorithm>
 #include <array>
-#include <atomic>
 #include <cmath>
 #include <fstream>
-#include <functional>
 #include <iostream>
 #include <limits>
 #include <map>
@@ -29,7 +28,6 @@
 #include <sstream>
 #include <stdexcept>
 #include <string>
-#include <thread>
 #include <vector>
 
 namespace view_servo
@@ -109,43 +107,6 @@ std::vector<Run> allRuns(const std::map<std::string, sim::World>& worlds, bool b
     }
   }
   return runs;
-}
-
-/** Calls `work(i)` for all i below `count`, on several threads. An exception ends all and is passed on. */
-void inParallel(std::size_t count, int max_threads, const std::function<void(std::size_t)>& work)
-{
-  const unsigned int wanted =
-      max_threads > 0 ? static_cast<unsigned int>(max_threads) : std::max(1U, std::thread::hardware_concurrency());
-  std::atomic<std::size_t> next{ 0 };
-  std::exception_ptr failure;
-  std::mutex mutex;
-  std::vector<std::thread> threads;
-  for (unsigned int k = 0; k < wanted; ++k)
-  {
-    threads.emplace_back([&] {
-      try
-      {
-        for (std::size_t i = next++; i < count; i = next++)
-        {
-          work(i);
-        }
-      }
-      catch (...)
-      {
-        const std::lock_guard<std::mutex> lock(mutex);
-        failure = std::current_exception();
-        next = count;
-      }
-    });
-  }
-  for (std::thread& thread : threads)
-  {
-    thread.join();
-  }
-  if (failure)
-  {
-    std::rethrow_exception(failure);
-  }
 }
 
 }  // namespace

@@ -2,19 +2,12 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-#include <filesystem>
+#include "experiment_context.h"
+
 #include <ostream>
 
 namespace view_servo
 {
-/** What an experiment is given. */
-struct ExperimentContext
-{
-  std::filesystem::path data;  ///< real images, for those that need them
-  bool brief = false;          ///< do a small part only
-  int threads = 0;             ///< at most so many; 0: as many as there are processors
-};
-
 /**
  * Homing in the simulated rooms: the thesis' two runs in both modes, and the same 100 random starts under plain and under
  * hard conditions (noise of 5 grey levels, odometry 5 % long, light x 0.7, somebody walking by, focal length 2 % long).

@@ -1,0 +1,472 @@
+// Copyright (c) 2026, the view_servo authors
+// SPDX-License-Identifier: BSD-3-Clause
+#include "hypothesis_experiments.h"
+
+#include "parallel.h"
+#include "point_pairs.h"
+#include "view_servo/geometry/fundamental.h"
+#include "view_servo/geometry/homography.h"
+#include "view_servo/matching/assignment.h"
+#include "view_servo/matching/point_matcher.h"
+#include "view_servo/robust/multi_hypothesis.h"
+
+#include <Eigen/Geometry>
+#include <Eigen/LU>
+#include <opencv2/calib3d.hpp>
+#include <opencv2/core.hpp>
+#include <opencv2/core/eigen.hpp>
+#include <opencv2/core/version.hpp>
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <iostream>
+#include <limits>
+#include <map>
+#include <mutex>
+#include <numeric>
+#include <string>
+#include <utility>
+#include <vector>
+
+#define VIEW_SERVO_HAS_USAC (CV_VERSION_MAJOR * 100 + CV_VERSION_MINOR >= 405)
+
+namespace view_servo
+{
+namespace
+{
+constexpr double NOT_A_NUMBER = std::numeric_limits<double>::quiet_NaN();
+
+enum class Algorithm
+{
+  RANSAC,      ///< on the one-to-one candidates
+  IMPORTANCE,  ///< Algorithm 2
+  MODIFIED,    ///< 9.5.1
+  WEIGHTED,    ///< the same with lambda (9.6.3)
+  MAGSAC       ///< OpenCV's, on the one-to-one candidates
+};
+
+const char* nameOf(Algorithm algorithm)
+{
+  switch (algorithm)
+  {
+    case Algorithm::RANSAC:
+      return "ransac";
+    case Algorithm::IMPORTANCE:
+      return "importance";
+    case Algorithm::MODIFIED:
+      return "modified";
+    case Algorithm::WEIGHTED:
+      return "weighted";
+    case Algorithm::MAGSAC:
+      return "usac_magsac";
+  }
+  return "";
+}
+
+/** Corners of two images and how they are associated. */
+struct Problem
+{
+  Points reference;
+  Points current;
+  AssociationMatrix association;
+};
+
+struct Settings
+{
+  Algorithm algorithm;
+  GeometryModel model = GeometryModel::FUNDAMENTAL;
+  int iterations = 2000;
+  double threshold = 1.0;  ///< [px]
+  Sampling sampling = Sampling::UNIFORM;
+  double view_consistency = 0.0;  ///< threshold of samples for F; 0 = not used
+  bool improvement = false;
+};
+
+struct Estimate
+{
+  Eigen::Matrix3d matrix = Eigen::Matrix3d::Constant(NOT_A_NUMBER);
+  std::vector<Association> matches;  ///< that agree with it
+  double ms = 0.0;
+};
+
+Correspondences pairsOf(const Problem& problem, const std::vector<Association>& matches)
+{
+  Correspondences pairs;
+  for (const Association& match : matches)
+  {
+    pairs.push_back({ problem.reference[static_cast<std::size_t>(match.row)],
+                      problem.current[static_cast<std::size_t>(match.column)] });
+  }
+  return pairs;
+}
+
+#if VIEW_SERVO_HAS_USAC
+/** In an order of its own for each seed, as OpenCV's generator always starts alike. */
+Eigen::Matrix3d estimateByMagsac(const Correspondences& pairs, const Settings& settings, Rng& rng)
+{
+  constexpr double CONFIDENCE = 0.9999;
+  std::vector<cv::Point2d> from;
+  std::vector<cv::Point2d> to;
+  for (const int i : detail::randomOrder(rng, pairs.size()))
+  {
+    const Correspondence& pair = pairs[static_cast<std::size_t>(i)];
+    from.emplace_back(pair.reference.x(), pair.reference.y());
+    to.emplace_back(pair.current.x(), pair.current.y());
+  }
+  Eigen::Matrix3d matrix = Eigen::Matrix3d::Constant(NOT_A_NUMBER);
+  const cv::Mat found =
+      settings.model == GeometryModel::FUNDAMENTAL
+          ? cv::findFundamentalMat(from, to, cv::USAC_MAGSAC, settings.threshold, CONFIDENCE, settings.iterations)
+          : cv::findHomography(from, to, cv::USAC_MAGSAC, settings.threshold, cv::noArray(), settings.iterations,
+                               CONFIDENCE);
+  if (found.size() == cv::Size(3, 3))
+  {
+    cv::cv2eigen(found, matrix);
+  }
+  return matrix;
+}
+#endif
+
+double squaredError(GeometryModel model, const Eigen::Matrix3d& matrix, const Correspondence& pair)
+{
+  return model == GeometryModel::FUNDAMENTAL ? sampsonError(matrix, pair)
+                                             : 0.5 * symmetricTransferError(matrix, matrix.inverse(), pair);
+}
+
+/** As every estimator gets it: the best entries of each row, and the candidates from these. */
+Estimate run(const Problem& problem, const Settings& settings, Rng& rng)
+{
+  RansacParams ransac_params;
+  ransac_params.inlier_threshold = settings.threshold;
+  ransac_params.sampling = settings.sampling;
+  ransac_params.min_iterations = ransac_params.max_iterations = settings.iterations;
+  ransac_params.max_rejected = std::numeric_limits<int>::max();
+  ransac_params.improvement_stage = settings.improvement;
+  MultiHypothesisParams params;
+  Estimate result;
+  const auto start = std::chrono::steady_clock::now();
+  if (settings.algorithm == Algorithm::RANSAC || settings.algorithm == Algorithm::MAGSAC)
+  {
+    const std::vector<Association> candidates =
+        maximumWeightMatching(problem.association.strongestOfRows(params.entries_per_row));
+    const Correspondences pairs = pairsOf(problem, candidates);
+    if (settings.algorithm == Algorithm::MAGSAC)
+    {
+#if VIEW_SERVO_HAS_USAC
+      result.matrix = estimateByMagsac(pairs, settings, rng);
+#endif
+    }
+    else if (settings.model == GeometryModel::FUNDAMENTAL)
+    {
+      const auto found = ransac(FundamentalEstimator(pairs, settings.view_consistency), ransac_params, rng);
+      result.matrix = found.model.value_or(result.matrix);
+    }
+    else if (const auto found = ransac(HomographyEstimator(pairs), ransac_params, rng); found.model)
+    {
+      result.matrix = found.model->h;
+    }
+    for (std::size_t i = 0; i < pairs.size(); ++i)
+    {
+      if (squaredError(settings.model, result.matrix, pairs[i]) <= settings.threshold * settings.threshold)
+      {
+        result.matches.push_back(candidates[i]);
+      }
+    }
+  }
+  else
+  {
+    params.sampling =
+        settings.algorithm == Algorithm::IMPORTANCE ? HypothesisSampling::IMPORTANCE : HypothesisSampling::CANDIDATES;
+    params.association_weight = settings.algorithm == Algorithm::WEIGHTED ? settings.threshold : 0.0;
+    if (settings.model == GeometryModel::FUNDAMENTAL)
+    {
+      const auto found = estimateFundamental(problem.association, problem.reference, problem.current, ransac_params,
+                                             params, rng, settings.view_consistency);
+      result.matrix = found.model.value_or(result.matrix);
+      result.matches = found.matches;
+    }
+    else
+    {
+      const auto found =
+          estimateHomography(problem.association, problem.reference, problem.current, ransac_params, params, rng);
+      result.matrix = found.model ? found.model->h : result.matrix;
+      result.matches = found.matches;
+    }
+  }
+  result.ms = std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - start).count();
+  return result;
+}
+
+bool available(Algorithm algorithm)
+{
+  return algorithm != Algorithm::MAGSAC || VIEW_SERVO_HAS_USAC;
+}
+
+double mean(const std::vector<double>& values)
+{
+  return std::accumulate(values.begin(), values.end(), 0.0) / static_cast<double>(values.size());
+}
+
+double deviation(const std::vector<double>& values)
+{
+  const double centre = mean(values);
+  double squares = 0.0;
+  for (const double value : values)
+  {
+    squares += (value - centre) * (value - centre);
+  }
+  return std::sqrt(squares / static_cast<double>(values.size()));
+}
+
+double median(std::vector<double> values)
+{
+  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
+  std::nth_element(values.begin(), middle, values.end(),
+                   [](double a, double b) { return a < b || (!std::isnan(a) && std::isnan(b)); });
+  return *middle;
+}
+
+// ------------------------------------------------------------------------------------------------- the simulation
+
+constexpr int POINTS = 500;
+
+/** Point i of one image is point i of the other. */
+Problem simulate(double sigma, Rng& rng)
+{
+  constexpr double FOCAL_LENGTH = 600.0;
+  constexpr double CENTRE = 300.0;
+  constexpr double NOISE = 0.5;  // [px]
+  const Eigen::Vector3d first(0.0, 0.0, -2.0);
+  const Eigen::Vector3d second(-0.7, 0.0, -2.0);
+  const Eigen::Vector3d looked_at(0.0, 0.0, 0.25);
+  const double turn = std::atan2(looked_at.x() - second.x(), looked_at.z() - second.z());
+  const Eigen::Matrix3d rotation = Eigen::AngleAxisd(-turn, Eigen::Vector3d::UnitY()).toRotationMatrix();
+  const auto project = [&](const Eigen::Vector3d& point) {
+    Eigen::Vector2d pixel = FOCAL_LENGTH * point.hnormalized() + Eigen::Vector2d::Constant(CENTRE);
+    pixel.x() += NOISE * gaussian(rng);
+    pixel.y() += NOISE * gaussian(rng);
+    return pixel;
+  };
+  Problem problem;
+  for (int i = 0; i < POINTS; ++i)
+  {
+    Eigen::Vector3d point;
+    point.x() = uniform(rng, -1.0, 1.0);
+    point.y() = uniform(rng, -1.0, 1.0);
+    point.z() = uniform(rng, 0.0, 0.5);
+    problem.reference.push_back(project(point - first));
+    problem.current.push_back(project(rotation * (point - second)));
+  }
+  std::vector<Association> entries;
+  for (int row = 0; row < POINTS; ++row)
+  {
+    for (int column = 0; column < POINTS; ++column)
+    {
+      entries.push_back({ row, column, row == column ? 1.0 : std::abs(sigma * gaussian(rng)) });
+    }
+  }
+  problem.association = AssociationMatrix(POINTS, POINTS, std::move(entries));
+  return problem;
+}
+
+/** One line of the table: an algorithm at a level of noise. */
+struct Simulation
+{
+  double sigma;
+  Settings settings;
+};
+
+std::vector<Simulation> simulations(bool brief)
+{
+  std::vector<Simulation> all;
+  const auto add = [&](Algorithm algorithm, double sigma, int iterations) {
+    if (available(algorithm))
+    {
+      Settings settings{ algorithm };
+      settings.iterations = iterations;
+      settings.improvement = algorithm == Algorithm::IMPORTANCE;
+      all.push_back({ sigma, settings });
+    }
+  };
+  const std::vector<double> sigmas =
+      brief ? std::vector<double>{ 0.25, 0.31 }
+            : std::vector<double>{ 0.25, 0.26, 0.27, 0.28, 0.29, 0.30, 0.31, 0.32, 0.33, 0.34 };
+  for (const double sigma : sigmas)
+  {
+    for (const Algorithm algorithm :
+         { Algorithm::MAGSAC, Algorithm::RANSAC, Algorithm::IMPORTANCE, Algorithm::MODIFIED, Algorithm::WEIGHTED })
+    {
+      add(algorithm, sigma, 2000);
+    }
+  }
+  if (!brief)
+  {
+    for (const double sigma : { 0.25, 0.29, 0.31, 0.33 })
+    {
+      add(Algorithm::RANSAC, sigma, 200000);
+      add(Algorithm::IMPORTANCE, sigma, 200000);
+    }
+    for (const int iterations : { 10000, 50000, 500000 })  // figure 9.4
+    {
+      add(Algorithm::IMPORTANCE, 0.31, iterations);
+    }
+  }
+  return all;
+}
+
+}  // namespace
+
+void runMultiHypothesisExperiment(const ExperimentContext& context, std::ostream& csv)
+{
+  const int runs = context.brief ? 3 : 20;
+  cv::setNumThreads(1);  // times are those of one thread
+  const std::vector<Simulation> all = simulations(context.brief);
+  std::vector<std::vector<double>> correct(all.size(), std::vector<double>(static_cast<std::size_t>(runs)));
+  std::vector<std::vector<double>> wrong = correct;
+  std::vector<std::vector<double>> ms = correct;
+  std::map<double, std::pair<double, double>> large;  // of sigma: entries off the diagonal over 1 and over 0.5
+  std::mutex mutex;
+  std::size_t done = 0;
+  inParallel(static_cast<std::size_t>(runs), context.threads, [&](std::size_t i) {
+    for (std::size_t k = 0; k < all.size(); ++k)
+    {
+      Rng scene_rng(i + 1);  // every algorithm and level sees the same points
+      const Problem problem = simulate(all[k].sigma, scene_rng);
+      Rng rng(1000 + i);
+      const Estimate estimate = run(problem, all[k].settings, rng);
+      const auto right = std::count_if(estimate.matches.begin(), estimate.matches.end(),
+                                       [](const Association& match) { return match.row == match.column; });
+      correct[k][i] = static_cast<double>(right);
+      wrong[k][i] = static_cast<double>(estimate.matches.size()) - static_cast<double>(right);
+      ms[k][i] = estimate.ms;
+      const std::lock_guard<std::mutex> lock(mutex);
+      if (all[k].settings.algorithm == Algorithm::MODIFIED)
+      {
+        for (const Association& entry : problem.association.entries())
+        {
+          const bool noise = entry.row != entry.column;
+          large[all[k].sigma].first += noise && entry.weight > 1.0 ? 1.0 / runs : 0.0;
+          large[all[k].sigma].second += noise && entry.weight > 0.5 ? 1.0 / runs : 0.0;
+        }
+      }
+      std::cerr << ++done << " of " << all.size() * static_cast<std::size_t>(runs) << ": sigma " << all[k].sigma << ", "
+                << nameOf(all[k].settings.algorithm) << ", " << all[k].settings.iterations
+                << " iterations: " << correct[k][i] << " correct, " << wrong[k][i] << " wrong, " << ms[k][i] << " ms"
+                << std::endl;
+    }
+  });
+  csv << "algorithm,iterations,sigma,runs,correct,correct_sd,wrong,ms,entries_over_1,entries_over_half\n";
+  for (std::size_t k = 0; k < all.size(); ++k)
+  {
+    csv << nameOf(all[k].settings.algorithm) << ',' << all[k].settings.iterations << ',' << all[k].sigma << ',' << runs
+        << ',' << mean(correct[k]) << ',' << deviation(correct[k]) << ',' << mean(wrong[k]) << ',' << median(ms[k])
+        << ',' << large[all[k].sigma].first << ',' << large[all[k].sigma].second << '\n';
+  }
+}
+
+// ------------------------------------------------------------------------------------------------------ real pairs
+
+void runRealPairsExperiment(const ExperimentContext& context, std::ostream& csv)
+{
+  constexpr double THRESHOLD = 2.0;          // [px]
+  constexpr double VIEW_CONSISTENCY = 0.03;  // as ViewConsistencyParams
+  const int runs = context.brief ? 3 : 20;
+  struct Images
+  {
+    std::string folder;
+    std::string name;
+    GeometryModel model;
+  };
+  std::vector<Images> all;
+  for (const char* name : { "booksh", "box", "castle", "corr", "kampa", "plant", "valbonne", "wash" })
+  {
+    all.push_back({ "kusvod2", name, GeometryModel::FUNDAMENTAL });
+  }
+  for (const char* name : { "biscuitbookbox", "book", "cubetoy" })
+  {
+    all.push_back({ "adelaidermf", name, GeometryModel::FUNDAMENTAL });
+  }
+  for (const char* name :
+       { "barrsmith", "bonhall", "elderhalla", "johnssona", "ladysymon", "library", "napiera", "sene" })
+  {
+    all.push_back({ "adelaidermf", name, GeometryModel::HOMOGRAPHY });
+  }
+  if (context.brief)
+  {
+    all.resize(1);
+  }
+  csv << "pair,model,algorithm,iterations,runs,candidates,candidates_correct,matches,correct,error_px,ms\n";
+  for (const Images& images : all)
+  {
+    const std::vector<PointPair> truths =  // one for each plane or motion
+        images.folder == "kusvod2" ? std::vector<PointPair>{ readKusvodPair(context.data, images.name) }
+                                   : readAdelaidePairs(context.data, images.model, images.name);
+    const PointPair& first = truths.front();
+    const PointMatcherParams params;
+    const PointFeatures reference = extractPointFeatures(first.reference, params);
+    const PointFeatures current = extractPointFeatures(first.current, params);
+    Problem problem;
+    for (const Corner& corner : reference.corners)
+    {
+      problem.reference.push_back(corner.position);
+    }
+    for (const Corner& corner : current.corners)
+    {
+      problem.current.push_back(corner.position);
+    }
+    problem.association = associatePoints(reference, ProfileIndex(reference.profiles), current, params);
+    const Correspondences candidates = pairsOf(
+        problem, maximumWeightMatching(problem.association.strongestOfRows(MultiHypothesisParams().entries_per_row)));
+    int most_correct = 0;
+    for (const PointPair& truth : truths)
+    {
+      most_correct = std::max(most_correct, truth.countCorrect(candidates));
+    }
+    for (const Algorithm algorithm :
+         { Algorithm::MAGSAC, Algorithm::RANSAC, Algorithm::MODIFIED, Algorithm::WEIGHTED, Algorithm::IMPORTANCE })
+    {
+      if (!available(algorithm))
+      {
+        continue;
+      }
+      Settings settings{ algorithm, images.model };
+      settings.threshold = THRESHOLD;
+      settings.sampling = Sampling::PROGRESSIVE;  // as the point matcher
+      settings.view_consistency = images.model == GeometryModel::FUNDAMENTAL ? VIEW_CONSISTENCY : 0.0;
+      settings.improvement = algorithm == Algorithm::IMPORTANCE;
+      settings.iterations = algorithm == Algorithm::IMPORTANCE && !context.brief ? 20000 : 2000;
+      std::vector<double> matches(static_cast<std::size_t>(runs));
+      std::vector<double> correct = matches;
+      std::vector<double> error = matches;
+      std::vector<double> ms = matches;
+      inParallel(matches.size(), context.threads, [&](std::size_t i) {
+        Rng rng(i + 1);
+        const Estimate estimate = run(problem, settings, rng);
+        const Correspondences found = pairsOf(problem, estimate.matches);
+        // Of several planes or motions, the one that was found.
+        error[i] = NOT_A_NUMBER;
+        for (const PointPair& truth : truths)
+        {
+          const double candidate = truth.geometryError(images.model, estimate.matrix);
+          if (!(candidate >= error[i]))
+          {
+            error[i] = candidate;
+            correct[i] = truth.countCorrect(found);
+          }
+        }
+        matches[i] = static_cast<double>(found.size());
+        ms[i] = estimate.ms;
+      });
+      csv << images.folder << '/' << images.name << ',' << (images.model == GeometryModel::FUNDAMENTAL ? "F" : "H")
+          << ',' << nameOf(algorithm) << ',' << settings.iterations << ',' << runs << ',' << candidates.size() << ','
+          << most_correct << ',' << median(matches) << ',' << median(correct) << ',' << median(error) << ','
+          << median(ms) << '\n';
+      std::cerr << images.folder << '/' << images.name << ", " << nameOf(algorithm) << ": " << median(correct)
+                << " correct of " << median(matches) << ", error " << median(error) << " px, " << median(ms) << " ms"
+                << std::endl;
+    }
+  }
+}
+
+}  // namespace view_servo

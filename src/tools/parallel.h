@@ -1,0 +1,16 @@
+// Copyright (c) 2026, the view_servo authors
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <cstddef>
+#include <functional>
+
+namespace view_servo
+{
+/**
+ * Calls `work(i)` for all i below `count`, on several threads. An exception ends all and is passed on.
+ * @param max_threads 0: as many as there are processors.
+ */
+void inParallel(std::size_t count, int max_threads, const std::function<void(std::size_t)>& work);
+
+}  // namespace view_servo
