@@ -1,0 +1,373 @@
+// Copyright (c) 2026, the view_servo authors
+// SPDX-License-Identifier: BSD-3-Clause
+
+/** @file
+ * Homography tracking beside OpenCV's means, on synthetic sequences of a plane, one thread, in one run:
+ *
+ *     bench_tracking speeds|hardships [PICTURE]
+ *
+ * speeds: 200 frames of 640x480, full 6-dof motion at 2 to 40 px a frame (mean of the image's corners), noise of 2 grey levels; then
+ * the same while the light changes by 40 %, in gain and across the image. Told are the frames before it is lost (an error
+ * over 10 px), the mean error at the corners of the stored view, and the time a frame:
+ * - odometry: the tracker, predicted by the true motion with noise of 1 %;
+ * - alone: the tracker from the last homography;
+ * - KLT: the stored view warped by the last homography, Lucas-Kanade flow of 200 points against it, RANSAC, twice;
+ * - ECC: cv::findTransformECC from the last homography.
+ * hardships, what a tracker has to bear: 40 % of the plane covered by something that moves, and jumps of 150 px that odometry
+ * tells of.
+ */
+#include "view_servo/geometry/homography.h"
+#include "view_servo/robust/random.h"
+#include "view_servo/tracking/homography_tracker.h"
+#include "view_servo/views/image_io.h"
+
+#include "sim/textures.h"
+
+#include <Eigen/Geometry>
+#include <Eigen/LU>
+#include <opencv2/calib3d.hpp>
+#include <opencv2/core.hpp>
+#include <opencv2/core/eigen.hpp>
+#include <opencv2/imgproc.hpp>
+#include <opencv2/video/tracking.hpp>
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <cstdint>
+#include <cstdio>
+#include <exception>
+#include <functional>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+namespace
+{
+using namespace view_servo;  // NOLINT(google-build-using-namespace): a program of its own
+
+constexpr int WIDTH = 640;
+constexpr int HEIGHT = 480;
+constexpr int FRAMES = 200;
+constexpr double LOST = 10.0;  // [px]
+
+using Tracker = std::function<std::optional<Eigen::Matrix3d>(const cv::Mat& image, const Eigen::Matrix3d& predicted)>;
+
+/** A camera that swings about a plane 1 m away: x_cur ~ H x_ref at a place along its way. */
+Eigen::Matrix3d homographyAt(double place)
+{
+  const auto swing = [place](double amplitude, double rate, double phase) {
+    return amplitude * (std::sin(rate * place + phase) - std::sin(phase));
+  };
+  Eigen::Matrix3d k;
+  k << 600.0, 0.0, 319.5, 0.0, 600.0, 239.5, 0.0, 0.0, 1.0;
+  const double pitch = swing(0.3, 1.0, 0.3);
+  const double yaw = swing(0.3, 0.8, 1.1);
+  const Eigen::Matrix3d rotation =
+      (Eigen::AngleAxisd(pitch, Eigen::Vector3d::UnitX()) * Eigen::AngleAxisd(yaw, Eigen::Vector3d::UnitY()) *
+       Eigen::AngleAxisd(swing(0.5, 0.6, 0.7), Eigen::Vector3d::UnitZ()))
+          .toRotationMatrix();
+  // It keeps looking at the middle, more or less.
+  const Eigen::Vector3d translation(-yaw + swing(0.05, 1.3, 2.0), pitch + swing(0.05, 1.1, 0.4), swing(0.15, 0.5, 0.2));
+  return k * (rotation + translation * Eigen::RowVector3d::UnitZ()) * k.inverse();
+}
+
+double cornerDistance(const Eigen::Matrix3d& a, const Eigen::Matrix3d& b)
+{
+  double sum = 0.0;
+  for (const double u : { 0.0, WIDTH - 1.0 })
+  {
+    for (const double v : { 0.0, HEIGHT - 1.0 })
+    {
+      sum += (transfer(a, { u, v }) - transfer(b, { u, v })).norm();
+    }
+  }
+  return 0.25 * sum;
+}
+
+/** Places along the way at equal speed in the image. */
+std::vector<Eigen::Matrix3d> sequence(double speed)
+{
+  constexpr int HALVINGS = 30;
+  std::vector<Eigen::Matrix3d> all;
+  double place = 0.0;
+  while (static_cast<int>(all.size()) < FRAMES)
+  {
+    const Eigen::Matrix3d last = homographyAt(place);
+    double low = 0.0;
+    double high = 1.0;
+    for (int i = 0; i < HALVINGS; ++i)
+    {
+      const double middle = 0.5 * (low + high);
+      (cornerDistance(homographyAt(place + middle), last) < speed ? low : high) = middle;
+    }
+    place += low;
+    all.push_back(homographyAt(place));
+  }
+  return all;
+}
+
+/** A picture that is larger than the stored view, which is its middle. */
+class Scene
+{
+public:
+  explicit Scene(const cv::Mat& picture)
+  {
+    cv::resize(picture, picture_, cv::Size(2 * WIDTH, 2 * HEIGHT), 0.0, 0.0, cv::INTER_AREA);
+    to_reference_ << 1.0, 0.0, -0.5 * WIDTH, 0.0, 1.0, -0.5 * HEIGHT, 0.0, 0.0, 1.0;
+  }
+
+  cv::Mat image(const Eigen::Matrix3d& h, std::uint64_t seed, double gain = 1.0, double slope = 0.0) const
+  {
+    constexpr double NOISE = 2.0;  // [grey levels]
+    cv::Mat matrix;
+    cv::eigen2cv(Eigen::Matrix3d(h * to_reference_), matrix);
+    cv::Mat seen;
+    cv::warpPerspective(picture_, seen, matrix, cv::Size(WIDTH, HEIGHT), cv::INTER_LINEAR, cv::BORDER_REFLECT);
+    cv::Mat values;
+    seen.convertTo(values, CV_32F);
+    for (int v = 0; v < HEIGHT; ++v)
+    {
+      for (int u = 0; u < WIDTH; ++u)
+      {
+        values.at<float>(v, u) *= static_cast<float>(gain * (1.0 + slope * (static_cast<double>(u) / WIDTH - 0.5)));
+      }
+    }
+    cv::Mat noise(values.size(), CV_32F);
+    cv::RNG(seed).fill(noise, cv::RNG::NORMAL, 0.0, NOISE);
+    values += noise;
+    values.convertTo(seen, CV_8U);
+    return seen;
+  }
+
+private:
+  cv::Mat picture_;
+  Eigen::Matrix3d to_reference_;
+};
+
+Tracker ours(const cv::Mat& reference)
+{
+  auto tracker = std::make_shared<HomographyTracker>(reference, cv::Rect(), HomographyTrackerParams());
+  return [tracker](const cv::Mat& image, const Eigen::Matrix3d& predicted) {
+    const TrackedHomography found = tracker->track(image, predicted);
+    return found.found ? std::optional<Eigen::Matrix3d>(found.h) : std::nullopt;
+  };
+}
+
+/** The strongest of the simple ones. */
+Tracker patchFlow(const cv::Mat& reference)
+{
+  std::vector<cv::Point2f> points;
+  cv::goodFeaturesToTrack(reference, points, 200, 0.01, 8);
+  return [reference, points](const cv::Mat& image, const Eigen::Matrix3d& predicted) -> std::optional<Eigen::Matrix3d> {
+    constexpr double MARGIN = 10.0;  // [px]
+    constexpr std::size_t FEWEST = 20;
+    Eigen::Matrix3d h = predicted;
+    for (int round = 0; round < 2; ++round)
+    {
+      cv::Mat matrix;
+      cv::eigen2cv(h, matrix);
+      cv::Mat warped;
+      cv::warpPerspective(reference, warped, matrix, image.size());
+      std::vector<cv::Point2f> stored;
+      std::vector<cv::Point2f> from;
+      for (const cv::Point2f& point : points)
+      {
+        const Eigen::Vector2d x = transfer(h, { point.x, point.y });
+        if (x.x() > MARGIN && x.y() > MARGIN && x.x() < image.cols - MARGIN && x.y() < image.rows - MARGIN)
+        {
+          stored.push_back(point);
+          from.emplace_back(static_cast<float>(x.x()), static_cast<float>(x.y()));
+        }
+      }
+      if (from.size() < FEWEST)
+      {
+        return std::nullopt;
+      }
+      std::vector<cv::Point2f> to;
+      std::vector<unsigned char> status;
+      std::vector<float> errors;
+      cv::calcOpticalFlowPyrLK(warped, image, from, to, status, errors, cv::Size(21, 21), 3);
+      std::vector<cv::Point2f> a;
+      std::vector<cv::Point2f> b;
+      for (std::size_t i = 0; i < to.size(); ++i)
+      {
+        if (status[i] != 0)
+        {
+          a.push_back(stored[i]);
+          b.push_back(to[i]);
+        }
+      }
+      const cv::Mat found = a.size() < FEWEST ? cv::Mat() : cv::findHomography(a, b, cv::RANSAC, 2.0);
+      if (found.empty())
+      {
+        return std::nullopt;
+      }
+      cv::cv2eigen(found, h);
+    }
+    return h;
+  };
+}
+
+Tracker ecc(const cv::Mat& reference)
+{
+  return [reference](const cv::Mat& image, const Eigen::Matrix3d& predicted) -> std::optional<Eigen::Matrix3d> {
+    cv::Mat matrix;
+    cv::eigen2cv(Eigen::Matrix3d(predicted / predicted(2, 2)), matrix);
+    matrix.convertTo(matrix, CV_32F);
+    try
+    {
+      cv::findTransformECC(reference, image, matrix, cv::MOTION_HOMOGRAPHY,
+                           cv::TermCriteria(cv::TermCriteria::COUNT + cv::TermCriteria::EPS, 30, 1e-4));
+    }
+    catch (const cv::Exception&)
+    {
+      return std::nullopt;
+    }
+    Eigen::Matrix3d h;
+    matrix.convertTo(matrix, CV_64F);
+    cv::cv2eigen(matrix, h);
+    return h;
+  };
+}
+
+struct Score
+{
+  int frames = 0;
+  double error = 0.0;  // mean [px]
+  double ms = 0.0;     // mean
+};
+
+/** How an image comes to be, of a frame and what is really there. */
+using Camera = std::function<cv::Mat(int frame, const Eigen::Matrix3d& h)>;
+
+/** @param odometry noise of the predicted motion, as a part of it; negative: no prediction. */
+Score run(const Tracker& tracker, const std::vector<Eigen::Matrix3d>& truth, const Camera& camera, double odometry)
+{
+  Score score;
+  Rng rng(5);
+  Eigen::Matrix3d last = Eigen::Matrix3d::Identity();
+  Eigen::Matrix3d last_truth = Eigen::Matrix3d::Identity();
+  for (int frame = 0; frame < static_cast<int>(truth.size()); ++frame)
+  {
+    const Eigen::Matrix3d& h = truth[static_cast<std::size_t>(frame)];
+    const cv::Mat image = camera(frame, h);
+    Eigen::Matrix3d predicted = last;
+    if (odometry >= 0.0)
+    {
+      Eigen::Matrix3d motion = h * last_truth.inverse();
+      motion /= motion(2, 2);
+      for (int i = 0; i < 9; ++i)
+      {
+        const double still = i % 4 == 0 ? 1.0 : 0.0;
+        motion(i / 3, i % 3) = still + (motion(i / 3, i % 3) - still) * (1.0 + odometry * gaussian(rng));
+      }
+      predicted = motion * last;
+    }
+    const auto start = std::chrono::steady_clock::now();
+    const std::optional<Eigen::Matrix3d> found = tracker(image, predicted);
+    score.ms += std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - start).count();
+    const double error = found ? cornerDistance(*found, h) : LOST + 1.0;
+    if (!(error < LOST))
+    {
+      break;
+    }
+    ++score.frames;
+    score.error += error;
+    last = *found;
+    last_truth = h;
+  }
+  score.ms /= std::max(1, score.frames);
+  score.error /= std::max(1, score.frames);
+  return score;
+}
+
+void print(const std::string& name, const Score& score)
+{
+  std::printf("  %-10s %3d frames  %7.3f px  %6.1f ms\n", name.c_str(), score.frames, score.error, score.ms);
+  std::fflush(stdout);
+}
+
+void runSpeeds(const Scene& scene, const cv::Mat& reference, bool light)
+{
+  for (const double speed : { 2.0, 5.0, 10.0, 20.0, 40.0 })
+  {
+    std::printf("%g px a frame%s\n", speed, light ? ", light changes" : "");
+    const std::vector<Eigen::Matrix3d> truth = sequence(speed);
+    const Camera camera = [&](int frame, const Eigen::Matrix3d& h) {
+      const double gain = light ? 1.0 - 0.4 * std::abs(std::sin(0.05 * frame)) : 1.0;
+      return scene.image(h, static_cast<std::uint64_t>(frame) + 1, gain, light ? 0.4 * std::sin(0.03 * frame) : 0.0);
+    };
+    print("odometry", run(ours(reference), truth, camera, 0.01));
+    print("alone", run(ours(reference), truth, camera, -1.0));
+    print("KLT", run(patchFlow(reference), truth, camera, -1.0));
+    print("ECC", run(ecc(reference), truth, camera, -1.0));
+  }
+}
+
+void runHardships(const Scene& scene, const cv::Mat& reference)
+{
+  const std::vector<Eigen::Matrix3d> truth = sequence(5.0);
+  const Scene other(sim::drawTexture("poster", cv::Size(2 * WIDTH, 2 * HEIGHT), 128.0, 20, 99));
+  std::printf("40 %% covered by something that moves, 5 px a frame\n");
+  const Camera covered = [&](int frame, const Eigen::Matrix3d& h) {
+    cv::Mat image = scene.image(h, static_cast<std::uint64_t>(frame) + 1);
+    const int left = (7 * frame) % (WIDTH * 6 / 10);
+    const cv::Rect part(left, 0, WIDTH * 4 / 10, HEIGHT);
+    other.image(Eigen::Matrix3d::Identity(), 7)(part).copyTo(image(part));
+    return image;
+  };
+  print("odometry", run(ours(reference), truth, covered, 0.01));
+  print("alone", run(ours(reference), truth, covered, -1.0));
+  print("KLT", run(patchFlow(reference), truth, covered, -1.0));
+
+  std::printf("a jump of 150 px that odometry tells of, every 20 frames\n");
+  std::vector<Eigen::Matrix3d> jumping = sequence(2.0);
+  for (std::size_t i = 0; i < jumping.size(); ++i)
+  {
+    Eigen::Matrix3d shift = Eigen::Matrix3d::Identity();
+    shift(0, 2) = (i / 20) % 2 == 1 ? 150.0 : 0.0;
+    jumping[i] = shift * jumping[i];
+  }
+  const Camera plain = [&](int frame, const Eigen::Matrix3d& h) {
+    return scene.image(h, static_cast<std::uint64_t>(frame) + 1);
+  };
+  print("odometry", run(ours(reference), jumping, plain, 0.01));
+  print("KLT", run(patchFlow(reference), jumping, plain, 0.01));
+}
+
+}  // namespace
+
+int main(int argc, char** argv)
+{
+  const std::string part = argc > 1 ? argv[1] : "";
+  if (part != "speeds" && part != "hardships")
+  {
+    std::fprintf(stderr, "usage: bench_tracking speeds|hardships [PICTURE]\n");
+    return 2;
+  }
+  cv::setNumThreads(1);
+  try
+  {
+    const cv::Mat picture =
+        argc > 2 ? readGreyImage(argv[2]) : sim::drawTexture("poster", cv::Size(2 * WIDTH, 2 * HEIGHT), 128.0, 20, 5);
+    const Scene scene(picture);
+    const cv::Mat reference = scene.image(Eigen::Matrix3d::Identity(), 1000);
+    if (part == "hardships")
+    {
+      runHardships(scene, reference);
+      return 0;
+    }
+    for (const bool light : { false, true })
+    {
+      runSpeeds(scene, reference, light);
+    }
+    return 0;
+  }
+  catch (const std::exception& error)
+  {
+    std::fprintf(stderr, "%s\n", error.what());
+    return 1;
+  }
+}

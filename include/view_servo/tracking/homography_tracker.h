@@ -1,0 +1,109 @@
+// Copyright (c) 2026, the view_servo authors
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <Eigen/Core>
+#include <opencv2/core/mat.hpp>
+
+#include <limits>
+#include <string>
+#include <vector>
+
+namespace view_servo
+{
+/** Options of the homography tracker. */
+struct HomographyTrackerParams
+{
+  int max_points = 200;          ///< corners of the stored view that are looked for, >= 12
+  int patch_radius = 10;         ///< patches of (2 r + 1)² pixels are compared; on coarse levels smaller ones, 2 to 20
+  int levels = 4;                ///< of the pyramids, the images among them; more catch faster motion, 1 to 6
+  double min_correlation = 0.7;  ///< of a patch that is found again, [0, 1)
+  double max_residual = 2.0;     ///< of a point that supports the homography [px], > 0
+  int min_supporting = 15;       ///< points that make a homography, >= 5
+  double min_support = 0.25;     ///< part of the points in sight that makes one, (0, 1]
+
+  /** All faults, one a line; empty when the parameters are usable. */
+  std::vector<std::string> validate() const;
+};
+
+/** What the tracker says of an image. */
+struct TrackedHomography
+{
+  bool found = false;
+  Eigen::Matrix3d h = Eigen::Matrix3d::Constant(std::numeric_limits<double>::quiet_NaN());  ///< x_cur ~ H x_ref
+  int looked_for = 0;                                     ///< points predicted to be in the image
+  int supporting = 0;                                     ///< of these, found where the homography sends them
+  double rms = std::numeric_limits<double>::quiet_NaN();  ///< of the supporting points [px]
+};
+
+/**
+ * Finds the homography of a planar scene from one image to the next (thesis 8.3, 8.4), always against the stored view, so
+ * that nothing drifts. Every corner is looked for where a predicted homography sends it: its patch, seen through that
+ * homography, is aligned with the image by the inverse compositional method (Baker & Matthews 2004), from coarse to fine;
+ * both are normalised to zero mean and unit norm, so that gain and offset of the light do not matter. As in the thesis no
+ * point is followed from image to image: each is found anew or not, and RANSAC on the coarsest level and robust fits below
+ * it, which weigh each patch by what its texture tells, decide which are believed. Hidden patches correlate too little and
+ * drop out.
+ *
+ * Stateless but for what it knows of the stored view; the caller predicts, from odometry or from the motion before.
+ */
+class HomographyTracker
+{
+public:
+  /**
+   * @param reference 8-bit, one channel. @param region of it that shows the plane [px]; empty = everywhere.
+   * @throws std::invalid_argument with all faults of the parameters, or when the image has the wrong type, the region
+   * leaves it, or it has too few corners.
+   */
+  HomographyTracker(const cv::Mat& reference, const cv::Rect& region, const HomographyTrackerParams& params);
+
+  /**
+   * @param current 8-bit, one channel, of any size.
+   * @param predicted where the homography is expected (x_cur ~ H x_ref).
+   * @throws std::invalid_argument when the image has the wrong type.
+   */
+  TrackedHomography track(const cv::Mat& current, const Eigen::Matrix3d& predicted) const;
+
+  /** The corners [px], strongest first. */
+  const std::vector<Eigen::Vector2d>& points() const
+  {
+    return points_;
+  }
+
+private:
+  /** A patch of one level, normalised, with what its alignment needs. */
+  struct Patch
+  {
+    bool usable = false;
+    int radius = 0;
+    Eigen::Matrix2d information;   // of its position [1/px²], for values of norm 1
+    std::vector<float> values;     // zero mean, unit norm
+    std::vector<float> descent_u;  // inverse information times the gradient of the normalised values
+    std::vector<float> descent_v;
+  };
+
+  /** Where a homography puts a patch, and where it is. */
+  struct Alignment
+  {
+    Eigen::Vector2d at;     // in the level of the stored view
+    Eigen::Vector2d shift;  // what the homography shows at `at` is the stored view at `at` + `shift`
+    Eigen::Vector2d found;  // in the level of the current image
+    double correlation;
+    const Patch* patch;
+  };
+
+  /** Down from a level. */
+  TrackedHomography trackFrom(const std::vector<cv::Mat>& pyramid, const Eigen::Matrix3d& predicted,
+                              int coarsest) const;
+  std::vector<Alignment> alignAll(const cv::Mat& current, std::size_t level, const Eigen::Matrix3d& h, int iterations,
+                                  int& looked_for) const;
+  static bool align(const cv::Mat& current, const Patch& patch, const Eigen::Matrix3d& h, int iterations,
+                    Alignment& alignment);
+  static Patch makePatch(const cv::Mat& image, const Eigen::Vector2d& at, int radius);
+
+  HomographyTrackerParams params_;
+  std::vector<Eigen::Vector2d> points_;      // pixels of the full image
+  std::vector<std::vector<Patch>> patches_;  // of levels, of points
+};
+
+}  // namespace view_servo

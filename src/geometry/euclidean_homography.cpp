@@ -1,0 +1,81 @@
+// Copyright (c) 2026, the view_servo authors
+// SPDX-License-Identifier: BSD-3-Clause
+#include "view_servo/geometry/euclidean_homography.h"
+
+#include <Eigen/Geometry>
+#include <Eigen/LU>
+#include <Eigen/SVD>
+#include <opencv2/calib3d.hpp>
+#include <opencv2/core.hpp>
+#include <opencv2/core/eigen.hpp>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+namespace view_servo
+{
+namespace
+{
+/** H between normalised coordinates with its middle singular value 1 and the sign that keeps points in front. */
+Eigen::Matrix3d euclidean(const Eigen::Matrix3d& h, const Eigen::Matrix3d& k, const Points& seen)
+{
+  Eigen::Matrix3d result = k.inverse() * h * k;
+  result /= Eigen::JacobiSVD<Eigen::Matrix3d>(result).singularValues()(1);
+  int ahead = 0;
+  for (const Eigen::Vector2d& point : seen)
+  {
+    const Eigen::Vector3d x = k.inverse() * point.homogeneous();
+    ahead += (result * x).z() > 0.0 ? 1 : -1;
+  }
+  return ahead >= 0 ? result : Eigen::Matrix3d(-result);
+}
+
+}  // namespace
+
+std::vector<EuclideanHomography> decomposeHomography(const Eigen::Matrix3d& h, const Eigen::Matrix3d& k,
+                                                     const Points& seen)
+{
+  constexpr double ONLY_TURNED = 1e-6;  // of the singular values, which are 1 then
+  std::vector<EuclideanHomography> result;
+  if (!h.allFinite() || seen.empty() || !(std::abs(h.determinant()) > 0.0))
+  {
+    return result;
+  }
+  const Eigen::Matrix3d normalized = euclidean(h, k, seen);
+  if (!normalized.allFinite() || !(normalized.determinant() > 0.0))
+  {
+    return result;  // seen from behind
+  }
+  const Eigen::JacobiSVD<Eigen::Matrix3d> svd(normalized, Eigen::ComputeFullU | Eigen::ComputeFullV);
+  if (svd.singularValues()(0) - svd.singularValues()(2) < ONLY_TURNED)
+  {
+    result.push_back({ svd.matrixU() * svd.matrixV().transpose(), Eigen::Vector3d::Zero(),
+                       Eigen::Vector3d::Constant(std::numeric_limits<double>::quiet_NaN()) });
+    return result;
+  }
+  cv::Mat matrix;
+  cv::eigen2cv(normalized, matrix);
+  std::vector<cv::Mat> rotations;
+  std::vector<cv::Mat> translations;
+  std::vector<cv::Mat> normals;
+  cv::decomposeHomographyMat(matrix, cv::Mat::eye(3, 3, CV_64F), rotations, translations, normals);
+  for (std::size_t i = 0; i < rotations.size(); ++i)
+  {
+    EuclideanHomography solution;
+    cv::cv2eigen(rotations[i], solution.rotation);
+    cv::cv2eigen(translations[i], solution.translation_over_distance);
+    cv::cv2eigen(normals[i], solution.normal);
+    const bool in_front = std::all_of(seen.begin(), seen.end(), [&](const Eigen::Vector2d& point) {
+      const Eigen::Vector3d x = k.inverse() * point.homogeneous();
+      return solution.normal.dot(x) > 0.0 && (solution.matrix() * x).z() > 0.0;
+    });
+    if (in_front)
+    {
+      result.push_back(solution);
+    }
+  }
+  return result;
+}
+
+}  // namespace view_servo

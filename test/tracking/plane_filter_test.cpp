@@ -1,0 +1,206 @@
+// Copyright (c) 2026, the view_servo authors
+// SPDX-License-Identifier: BSD-3-Clause
+#include "view_servo/tracking/plane_filter.h"
+
+#include "../support/synthetic_scene.h"
+#include "view_servo/geometry/homography.h"
+
+#include <gtest/gtest.h>
+#include <Eigen/Geometry>
+#include <Eigen/LU>
+
+#include <cmath>
+#include <limits>
+#include <optional>
+#include <stdexcept>
+#include <vector>
+
+namespace view_servo
+{
+namespace
+{
+constexpr double DEGREE = M_PI / 180.0;
+
+Eigen::Matrix3d cameraMatrix()
+{
+  Eigen::Matrix3d k;
+  k << 600.0, 0.0, 320.0, 0.0, 600.0, 240.0, 0.0, 0.0, 1.0;
+  return k;
+}
+
+/** A camera that moves before a plane, with the homographies that noisy points give. */
+class Approach
+{
+public:
+  explicit Approach(std::uint64_t seed) : rng_(seed)
+  {
+    normal_ = test::randomRotation(rng_, 0.2) * Eigen::Vector3d::UnitZ();
+    reference_in_odom_ = Eigen::Translation3d(0.4, -0.2, 0.3) * Eigen::Quaterniond(test::randomRotation(rng_, 0.5));
+    const double bearing = uniform(rng_, 0.0, 2.0 * M_PI);
+    start_ = Eigen::Vector3d(0.3 * std::cos(bearing), 0.3 * std::sin(bearing), uniform(rng_, -0.2, 0.0));
+    turn_ = test::randomRotation(rng_, 0.08);
+    for (int i = 0; i < 60; ++i)
+    {
+      const double u = uniform(rng_, 120.0, 520.0);
+      points_.push_back({ u, uniform(rng_, 80.0, 400.0) });
+    }
+  }
+
+  const Eigen::Vector3d& normal() const
+  {
+    return normal_;
+  }
+
+  /** In the reference camera's frame; from the start at 0 to the reference at 1. */
+  Eigen::Isometry3d camera(double part) const
+  {
+    Eigen::Isometry3d pose = Eigen::Isometry3d::Identity();
+    pose.translation() = (1.0 - part) * start_;
+    pose.linear() = Eigen::Quaterniond(turn_).slerp(part, Eigen::Quaterniond::Identity()).toRotationMatrix();
+    return pose;
+  }
+  Eigen::Isometry3d cameraInOdom(double part) const
+  {
+    return reference_in_odom_ * camera(part);
+  }
+
+  EuclideanHomography truth(double part) const
+  {
+    const Eigen::Isometry3d motion = camera(part).inverse();
+    return { motion.linear(), motion.translation() / DISTANCE, normal_ };
+  }
+
+  std::vector<EuclideanHomography> measure(double part, double noise)
+  {
+    const Eigen::Matrix3d k = cameraMatrix();
+    const Eigen::Matrix3d h = k * truth(part).matrix() * k.inverse();
+    Correspondences pairs;
+    for (const Eigen::Vector2d& point : points_)
+    {
+      Eigen::Vector2d current = transfer(h, point);
+      current.x() += noise * gaussian(rng_);
+      current.y() += noise * gaussian(rng_);
+      pairs.push_back({ point, current });
+    }
+    const auto linear = homographyFromPoints(pairs);
+    return decomposeHomography(refineHomography(*linear, pairs), k, points_);
+  }
+
+  static constexpr double DISTANCE = 0.7;  // [m]
+
+private:
+  Rng rng_;
+  Eigen::Vector3d normal_;
+  Eigen::Isometry3d reference_in_odom_;
+  Eigen::Vector3d start_;
+  Eigen::Matrix3d turn_;
+  Points points_;
+};
+
+double rotationError(const Eigen::Matrix3d& a, const Eigen::Matrix3d& b)
+{
+  return Eigen::AngleAxisd(Eigen::Matrix3d(a.transpose() * b)).angle();
+}
+
+}  // namespace
+
+TEST(PlaneFilterParams, NameAllFaultsAtOnce)
+{
+  PlaneFilterParams params;
+  EXPECT_TRUE(params.validate().empty());
+  params.window = 0.0;
+  params.max_measurements = 1;
+  params.decision = std::numeric_limits<double>::quiet_NaN();
+  EXPECT_EQ(params.validate().size(), 3U);
+  EXPECT_THROW(PlaneFilter{ params }, std::invalid_argument);
+}
+
+TEST(PlaneFilter, KnowsNothingAtFirst)
+{
+  PlaneFilter filter{ PlaneFilterParams() };
+  EXPECT_FALSE(filter.estimate());
+  filter.add(Eigen::Isometry3d::Identity(), {});
+  EXPECT_FALSE(filter.estimate());
+  // A camera that has only turned tells no plane.
+  filter.add(Eigen::Isometry3d::Identity(),
+             { { Eigen::Matrix3d::Identity(), Eigen::Vector3d::Zero(),
+                 Eigen::Vector3d::Constant(std::numeric_limits<double>::quiet_NaN()) } });
+  EXPECT_FALSE(filter.estimate());
+}
+
+TEST(PlaneFilter, FindsPlaneDistanceAndMotionOnTheWay)
+{
+  for (std::uint64_t seed = 1; seed <= 20; ++seed)
+  {
+    Approach approach(seed);
+    PlaneFilter filter{ PlaneFilterParams() };
+    constexpr int STEPS = 80;
+    double raw = 0.0;
+    double filtered = 0.0;
+    for (int i = 0; i <= STEPS; ++i)
+    {
+      const double part = 0.9 * i / STEPS;
+      const auto solutions = approach.measure(part, 0.3);
+      filter.add(approach.cameraInOdom(part), solutions);
+      const auto estimate = filter.estimate();
+      ASSERT_TRUE(estimate) << seed;
+      if (!estimate->ambiguous)
+      {
+        EXPECT_GT(estimate->motion.normal.dot(approach.normal()), std::cos(8.0 * DEGREE)) << seed << ", " << i;
+      }
+      if (i >= STEPS / 2)
+      {
+        ASSERT_TRUE(estimate->distance) << seed << ", " << i;
+        EXPECT_FALSE(estimate->ambiguous) << seed << ", " << i;
+        EXPECT_NEAR(*estimate->distance, Approach::DISTANCE, 0.05 * Approach::DISTANCE) << seed << ", " << i;
+        EXPECT_GT(estimate->motion.normal.dot(approach.normal()), std::cos(3.0 * DEGREE)) << seed << ", " << i;
+        const EuclideanHomography truth = approach.truth(part);
+        double best = 1e9;
+        for (const EuclideanHomography& solution : solutions)
+        {
+          best = std::min(best, rotationError(solution.rotation, truth.rotation));
+        }
+        raw += best;
+        filtered += rotationError(estimate->motion.rotation, truth.rotation);
+        EXPECT_LT((estimate->motion.translation_over_distance - truth.translation_over_distance).norm(), 0.02) << seed;
+      }
+    }
+    EXPECT_LT(filtered, raw) << seed;
+  }
+}
+
+TEST(PlaneFilter, TellsNoDistanceBeforeTheCameraHasMovedEnough)
+{
+  Approach approach(3);
+  PlaneFilter filter{ PlaneFilterParams() };
+  for (int i = 0; i < 40; ++i)
+  {
+    filter.add(approach.cameraInOdom(0.2), approach.measure(0.2, 0.3));
+    ASSERT_TRUE(filter.estimate());
+    EXPECT_FALSE(filter.estimate()->distance);
+  }
+}
+
+TEST(PlaneFilter, StaysAmbiguousWhereNothingTells)
+{
+  // Two decompositions at one place: their normals do not move.
+  int ambiguous = 0;
+  for (std::uint64_t seed = 1; seed <= 20; ++seed)
+  {
+    Approach approach(seed);
+    if (approach.measure(0.1, 0.0).size() != 2U)
+    {
+      continue;
+    }
+    PlaneFilter filter{ PlaneFilterParams() };
+    for (int i = 0; i < 30; ++i)
+    {
+      filter.add(approach.cameraInOdom(0.1), approach.measure(0.1, 0.02));
+    }
+    ++ambiguous;
+    EXPECT_TRUE(filter.estimate()->ambiguous) << seed;
+  }
+  EXPECT_GT(ambiguous, 0);
+}
+
+}  // namespace view_servo
