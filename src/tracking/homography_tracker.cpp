@@ -80,8 +80,8 @@ float sample(const cv::Mat& image, float u, float v)
   return above + fv * (below - above);
 }
 
-/** Zero mean, unit norm; false when there is hardly any contrast. */
-bool normalize(std::vector<float>& values)
+/** To zero mean and unit norm. @return the norm there was; 0, and nothing changes, when there is hardly any contrast. */
+float normalize(std::vector<float>& values)
 {
   constexpr float LEAST_DEVIATION = 2.0F;  // [grey levels]
   const float count = static_cast<float>(values.size());
@@ -96,13 +96,13 @@ bool normalize(std::vector<float>& values)
   const float norm = std::sqrt(std::max(0.0F, squares - sum * mean));
   if (!(norm > LEAST_DEVIATION * std::sqrt(count)))
   {
-    return false;
+    return 0.0F;
   }
   for (float& value : values)
   {
     value = (value - mean) / norm;
   }
-  return true;
+  return norm;
 }
 
 /** RANSAC; empty when too few agree. */
@@ -309,22 +309,11 @@ HomographyTracker::Patch HomographyTracker::makePatch(const cv::Mat& image, cons
     }
   }
   // The normalised values change by the gradient without its mean and without its part along the values.
-  const std::vector<float> raw = patch.values;
-  if (!normalize(patch.values))
+  const float norm = normalize(patch.values);
+  if (!(norm > 0.0F))
   {
     return patch;
   }
-  float norm = 0.0F;
-  float mean = 0.0F;
-  for (const float value : raw)
-  {
-    mean += value / static_cast<float>(raw.size());
-  }
-  for (const float value : raw)
-  {
-    norm += (value - mean) * (value - mean);
-  }
-  norm = std::sqrt(norm);
   const auto tangent = [&](std::vector<float>& gradient) {
     float average = 0.0F;
     float along = 0.0F;
@@ -393,7 +382,7 @@ bool HomographyTracker::align(const cv::Mat& current, const Patch& patch, const 
         x += along;
       }
     }
-    if (!normalize(values))
+    if (!(normalize(values) > 0.0F))
     {
       return false;
     }
