@@ -121,6 +121,17 @@ private:
   Points back_;
 };
 
+/** The index of the entry at the place of a match, which there must be. */
+int entryOf(const AssociationMatrix& association, const Association& match)
+{
+  std::size_t entry = association.rowBegin(match.row);
+  while (association.entries()[entry].column != match.column)
+  {
+    ++entry;
+  }
+  return static_cast<int>(entry);
+}
+
 /**
  * Support of a model by the maximum-weight matching of the entries that agree with it (Algorithm 2, steps 5 to 8). The
  * cost is the number of points that stay without a match, less a fraction that tells equal numbers apart by weight.
@@ -165,12 +176,7 @@ public:
     inliers.clear();
     for (const Association& match : match())
     {
-      std::size_t entry = association_.rowBegin(match.row);
-      while (association_.entries()[entry].column != match.column)
-      {
-        ++entry;
-      }
-      inliers.push_back(static_cast<int>(entry));
+      inliers.push_back(entryOf(association_, match));
     }
     std::sort(inliers.begin(), inliers.end());
   }
@@ -256,12 +262,7 @@ std::vector<int> candidateEntries(const AssociationMatrix& association)
   std::vector<int> result;
   for (const Association& match : maximumWeightMatching(association))
   {
-    std::size_t entry = association.rowBegin(match.row);
-    while (association.entries()[entry].column != match.column)
-    {
-      ++entry;
-    }
-    result.push_back(static_cast<int>(entry));
+    result.push_back(entryOf(association, match));
   }
   return result;
 }
@@ -294,14 +295,12 @@ MultiHypothesisResult<typename Fit::Estimator::Model> estimate(const Association
   std::unique_ptr<Sampler> sampler;
   if (params.sampling == HypothesisSampling::CANDIDATES)
   {
-    result.candidates = candidates.size();
     sampler = std::make_unique<ListSampler>(ransac_params.sampling, std::move(candidates), Estimator::SAMPLE_SIZE,
                                             0.5 * ransac_params.max_iterations);
   }
   else
   {
     // As many replacements as the improvement stage of RANSAC would try (9.4).
-    result.candidates = pairs.size();
     sampler =
         std::make_unique<ImportanceSampler>(association, Estimator::SAMPLE_SIZE, static_cast<int>(candidates.size()));
   }

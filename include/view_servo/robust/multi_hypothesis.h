@@ -41,7 +41,6 @@ struct MultiHypothesisResult
 {
   std::optional<Model> model;        ///< empty: no sample gave one
   std::vector<Association> matches;  ///< one-to-one, that agree with the model, in the order of rows
-  std::size_t candidates = 0;        ///< that samples came from, or entries
   RansacStatistics statistics;
 };
 
