@@ -4,7 +4,7 @@
 
 namespace view_servo
 {
-std::vector<Parameter> homingParameters(HomingParams& params, BaseLimits& limits)
+std::vector<Parameter> homingParameters(HomingParams& params, VelocityLimits& limits)
 {
   HeadingVoteParams& vote = params.vote;
   HeadingHypothesesParams& hypotheses = params.hypotheses;

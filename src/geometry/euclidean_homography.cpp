@@ -15,10 +15,15 @@
 
 namespace view_servo
 {
-namespace
+Eigen::Matrix3d nearestRotation(const Eigen::Matrix3d& matrix)
 {
-/** H between normalised coordinates with its middle singular value 1 and the sign that keeps points in front. */
-Eigen::Matrix3d euclidean(const Eigen::Matrix3d& h, const Eigen::Matrix3d& k, const Points& seen)
+  const Eigen::JacobiSVD<Eigen::Matrix3d> svd(matrix, Eigen::ComputeFullU | Eigen::ComputeFullV);
+  Eigen::Matrix3d signs = Eigen::Matrix3d::Identity();
+  signs(2, 2) = (svd.matrixU() * svd.matrixV().transpose()).determinant();
+  return svd.matrixU() * signs * svd.matrixV().transpose();
+}
+
+Eigen::Matrix3d calibratedHomography(const Eigen::Matrix3d& h, const Eigen::Matrix3d& k, const Points& seen)
 {
   Eigen::Matrix3d result = k.inverse() * h * k;
   result /= Eigen::JacobiSVD<Eigen::Matrix3d>(result).singularValues()(1);
@@ -31,7 +36,19 @@ Eigen::Matrix3d euclidean(const Eigen::Matrix3d& h, const Eigen::Matrix3d& k, co
   return ahead >= 0 ? result : Eigen::Matrix3d(-result);
 }
 
-}  // namespace
+EuclideanHomography motionBefore(const Eigen::Matrix3d& calibrated, const Eigen::Vector3d& normal)
+{
+  const Eigen::Matrix3d along = calibrated * (Eigen::Matrix3d::Identity() - normal * normal.transpose());
+  const Eigen::Matrix3d rotation = nearestRotation(along);  // of two directions; the third follows from them
+  return { rotation, (calibrated - rotation) * normal, normal };
+}
+
+EuclideanHomography movedOn(const EuclideanHomography& homography, const Eigen::Isometry3d& motion, double distance)
+{
+  return { motion.linear() * homography.rotation,
+           motion.linear() * homography.translation_over_distance + motion.translation() / distance,
+           homography.normal };
+}
 
 std::vector<EuclideanHomography> decomposeHomography(const Eigen::Matrix3d& h, const Eigen::Matrix3d& k,
                                                      const Points& seen)
@@ -42,7 +59,7 @@ std::vector<EuclideanHomography> decomposeHomography(const Eigen::Matrix3d& h, c
   {
     return result;
   }
-  const Eigen::Matrix3d normalized = euclidean(h, k, seen);
+  const Eigen::Matrix3d normalized = calibratedHomography(h, k, seen);
   if (!normalized.allFinite() || !(normalized.determinant() > 0.0))
   {
     return result;  // seen from behind

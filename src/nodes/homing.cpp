@@ -72,7 +72,7 @@ struct Params
   double odometry_timeout = 0.25;
   double match_timeout = 0.25;
   HomingParams homing;
-  BaseLimits limits;
+  VelocityLimits limits;
 
   void read(ParameterReader& reader)
   {
@@ -925,7 +925,7 @@ private:
   const Params params_;
 
   std::mutex control_mutex_;  // guards what follows; taken before mutex_
-  VelocityLimiter limiter_;
+  BaseVelocityLimiter limiter_;
   BaseVelocity wanted_ = BaseVelocity::Zero();
   std::optional<Clock::time_point> inputs_missing_since_;
   int zeros_sent_ = 0;

@@ -3,6 +3,7 @@
 #include "sim/homing_trial.h"
 
 #include "sim/renderer.h"
+#include "sim/trial.h"
 #include "sim/visibility.h"
 #include "view_servo/views/line_view_matcher.h"
 #include "view_servo/views/prepared_image.h"
@@ -26,28 +27,6 @@ constexpr double ODOMETRY_PERIOD = 0.02;  // [s]
 constexpr double CONTROL_PERIOD = 0.05;   // [s]
 constexpr double IMAGE_DELAY = 0.05;      // from the stamp to what homing makes of it [s]
 constexpr double SETTLING = 1.0;          // after homing has ended, until the error is measured [s]
-
-/** True at each multiple of a period. */
-class Every
-{
-public:
-  explicit Every(double period, double first = 0.0) : period_(period), next_(first)
-  {
-  }
-  bool due(double time)
-  {
-    if (time < next_ - 1e-9)
-    {
-      return false;
-    }
-    next_ += period_;
-    return true;
-  }
-
-private:
-  double period_;
-  double next_;
-};
 
 /** Somebody walks by, from left to right in 2 s, 1.2 m in front of the camera. */
 void drawPasserBy(double seconds, const Camera& camera, double camera_height, cv::Mat& image)
@@ -79,24 +58,6 @@ void drawPasserBy(double seconds, const Camera& camera, double camera_height, cv
       image.at<unsigned char>(v, u) = static_cast<unsigned char>(60 + 45 * stripe);
     }
   }
-}
-
-Camera withFocalLengthError(Camera camera, double error)
-{
-  camera.k(0, 0) *= 1.0 + error;
-  camera.k(1, 1) *= 1.0 + error;
-  camera.projection(0, 0) *= 1.0 + error;
-  camera.projection(1, 1) *= 1.0 + error;
-  return camera;
-}
-
-World withNoise(World world, double noise)
-{
-  if (noise >= 0.0)
-  {
-    world.quality.noise = noise;
-  }
-  return world;
 }
 
 struct Matches
@@ -134,7 +95,7 @@ struct HomingTrials::Parts
 };
 
 HomingTrials::HomingTrials(const World& world, const HomingTrialParams& params)
-  : world_(withNoise(world, params.conditions.image_noise)),
+  : world_(withImageNoise(world, params.conditions.image_noise)),
     params_(params),
     parts_(std::make_unique<Parts>(world_, params.seed))
 {
@@ -163,7 +124,7 @@ HomingOutcome HomingTrials::run(const PlanarPose& start, const std::function<voi
   const Camera camera = withFocalLengthError(world_.camera, conditions.focal_length_error);
   const std::unique_ptr<Homing> homing =
       makeHoming(params_.homing, { parts_->reference->grey(), camera, CameraMount(world_.camera_on_base) });
-  VelocityLimiter limiter(params_.limits);
+  BaseVelocityLimiter limiter(params_.limits);
   Every odometry_due(ODOMETRY_PERIOD);
   Every control_due(CONTROL_PERIOD);
   Every image_due(1.0 / world_.camera_rate);

@@ -29,7 +29,7 @@ struct HomingConditions
 struct HomingTrialParams
 {
   HomingParams homing;
-  BaseLimits limits;
+  VelocityLimits limits;
   HomingConditions conditions;
   bool use_points = true;
   bool use_lines = true;

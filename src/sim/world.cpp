@@ -140,8 +140,8 @@ public:
   World read()
   {
     requireKeys(root_, "a world",
-                { "robot", "camera", "light", "background", "textures", "rectangles", "boxes", "goal", "starts",
-                  "trajectories" });
+                { "robot", "camera", "light", "background", "textures", "rectangles", "boxes", "goal", "region",
+                  "starts", "trajectories" });
     readRobot(required(root_, "robot", "a world"));
     readCamera(required(root_, "camera", "a world"));
     if (root_["light"])
@@ -166,6 +166,10 @@ public:
       fail(root_, "a world needs 'rectangles' or 'boxes'");
     }
     world_.goal = pose(required(root_, "goal", "a world"));
+    if (root_["region"])
+    {
+      readRegion(root_["region"]);
+    }
     for (const auto& entry : root_["starts"])
     {
       world_.starts[convert<std::string>(entry.first, "a start's name")] = pose(entry.second);
@@ -200,6 +204,18 @@ private:
     else
     {
       fail(node["kind"], "unknown kind of robot '" + kind + "', known: nomad, puma");
+    }
+  }
+
+  void readRegion(const YAML::Node& node)
+  {
+    const Eigen::Vector4d values = vector<4>(node, "'region'");
+    const Eigen::Vector4i pixels = values.cast<int>();
+    world_.region = cv::Rect(pixels(0), pixels(1), pixels(2), pixels(3));
+    const cv::Rect image(0, 0, world_.camera.width, world_.camera.height);
+    if (pixels.cast<double>() != values || world_.region.empty() || (world_.region & image) != world_.region)
+    {
+      fail(node, "'region' must be [x, y, width, height] in whole pixels, within the image");
     }
   }
 

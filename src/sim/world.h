@@ -7,6 +7,7 @@
 #include <Eigen/Core>
 #include <Eigen/Geometry>
 #include <opencv2/core/mat.hpp>
+#include <opencv2/core/types.hpp>
 
 #include <filesystem>
 #include <map>
@@ -86,6 +87,7 @@ struct World
   std::vector<Surface> surfaces;
   std::vector<Obstacle> obstacles;
   Eigen::Isometry3d goal = Eigen::Isometry3d::Identity();
+  cv::Rect region;  ///< of interest, in the view at the goal [px]; empty: all of it
   std::map<std::string, Eigen::Isometry3d> starts;
   std::map<std::string, std::vector<Waypoint>> trajectories;
 

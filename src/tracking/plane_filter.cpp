@@ -4,33 +4,13 @@
 
 #include "view_servo/geometry/faults.h"
 
-#include <Eigen/LU>
-#include <Eigen/SVD>
-
 #include <algorithm>
 #include <cmath>
 #include <iterator>
+#include <limits>
 
 namespace view_servo
 {
-namespace
-{
-/** The rotation nearest to a sum of rotations (orthogonal Procrustes). */
-Eigen::Matrix3d nearestRotation(const Eigen::Matrix3d& sum)
-{
-  const Eigen::JacobiSVD<Eigen::Matrix3d> svd(sum, Eigen::ComputeFullU | Eigen::ComputeFullV);
-  Eigen::Matrix3d signs = Eigen::Matrix3d::Identity();
-  signs(2, 2) = (svd.matrixU() * svd.matrixV().transpose()).determinant();
-  return svd.matrixU() * signs * svd.matrixV().transpose();
-}
-
-bool hasNormal(const EuclideanHomography& solution)
-{
-  return solution.normal.allFinite();
-}
-
-}  // namespace
-
 std::vector<std::string> PlaneFilterParams::validate() const
 {
   Faults faults;
@@ -40,10 +20,18 @@ std::vector<std::string> PlaneFilterParams::validate() const
   return faults.list();
 }
 
+void PlaneFilter::Track::add(const EuclideanHomography& solution)
+{
+  const double information = solution.translation_over_distance.squaredNorm();
+  normals += information * solution.normal;
+  weight += information;
+  ++count;
+}
+
 double PlaneFilter::Track::scatter() const
 {
-  // |sum| = count times the mean cosine, about 1 - angle²/2.
-  return count == 0 ? 0.0 : std::max(0.0, 2.0 * (1.0 - normals.norm() / static_cast<double>(count)));
+  // |sum| = weight times the mean cosine, about 1 - angle²/2.
+  return weight > 0.0 ? std::max(0.0, 2.0 * (1.0 - normals.norm() / weight)) : 0.0;
 }
 
 PlaneFilter::PlaneFilter(const PlaneFilterParams& params) : params_(params)
@@ -51,45 +39,28 @@ PlaneFilter::PlaneFilter(const PlaneFilterParams& params) : params_(params)
   requireNoFaults("parameters of the plane filter", params.validate());
 }
 
-void PlaneFilter::append(Track& track, const Measurement& measurement) const
+void PlaneFilter::add(const std::optional<Eigen::Isometry3d>& camera_in_odom, const Eigen::Matrix3d& h,
+                      const Eigen::Matrix3d& k, const Points& seen)
 {
-  track.normals += measurement.motion.normal;
-  ++track.count;
-  if (!track.measurements.empty())
+  const std::vector<EuclideanHomography> solutions = decomposeHomography(h, k, seen);
+  if (solutions.empty())
   {
-    const Eigen::Isometry3d last_in_this =
-        measurement.camera_in_odom.inverse() * track.measurements.back().camera_in_odom;
-    track.way += last_in_this.translation().norm();
-    // The equations of d between this measurement and those of the window.
-    for (const Measurement& earlier : track.measurements)
-    {
-      const Eigen::Isometry3d moved = measurement.camera_in_odom.inverse() * earlier.camera_in_odom;
-      const Eigen::Vector3d change =
-          measurement.motion.translation_over_distance - moved.linear() * earlier.motion.translation_over_distance;
-      track.squared_way += moved.translation().squaredNorm();
-      track.change_by_way += change.dot(moved.translation());
-    }
+    return;
   }
-  track.measurements.push_back(measurement);
-  const auto too_far = [&] {
-    const Eigen::Vector3d way =
-        measurement.camera_in_odom.translation() - track.measurements.front().camera_in_odom.translation();
-    return way.norm() > params_.window;
-  };
-  while (track.measurements.size() > 2 &&
-         (too_far() || track.measurements.size() > static_cast<std::size_t>(params_.max_measurements)))
-  {
-    track.measurements.pop_front();
-  }
+  followNormals(solutions);
+  remember({ camera_in_odom, calibratedHomography(h, k, seen) });
 }
 
-void PlaneFilter::add(const Eigen::Isometry3d& camera_in_odom, const std::vector<EuclideanHomography>& solutions)
+void PlaneFilter::followNormals(const std::vector<EuclideanHomography>& solutions)
 {
-  constexpr std::size_t FEWEST = 8;    // measurements before the scatter tells
-  constexpr double NOISE = 1e-4;       // scatter that noise alone may have [rad²]
-  constexpr double SAME_NORMAL = 0.9;  // cosine: a measurement further away is of neither
+  constexpr double LEAST_TRANSLATION = 0.03;  // over d: a shorter one does not tell the normal
+  constexpr std::size_t FEWEST = 8;           // measurements before the scatter tells
+  constexpr double NOISE = 1e-4;              // scatter that noise alone may have [rad²]
+  constexpr double SAME_NORMAL = 0.9;         // cosine: a measurement further away is of neither
   std::vector<EuclideanHomography> usable;
-  std::copy_if(solutions.begin(), solutions.end(), std::back_inserter(usable), hasNormal);
+  std::copy_if(solutions.begin(), solutions.end(), std::back_inserter(usable), [](const EuclideanHomography& solution) {
+    return solution.normal.allFinite() && solution.translation_over_distance.norm() >= LEAST_TRANSLATION;
+  });
   if (usable.empty())
   {
     return;
@@ -99,7 +70,7 @@ void PlaneFilter::add(const Eigen::Isometry3d& camera_in_odom, const std::vector
     for (const EuclideanHomography& solution : usable)
     {
       tracks_.emplace_back();
-      append(tracks_.back(), { camera_in_odom, solution });
+      tracks_.back().add(solution);
     }
     // Until something tells: the plane that faces the camera more.
     std::stable_sort(tracks_.begin(), tracks_.end(),
@@ -131,7 +102,7 @@ void PlaneFilter::add(const Eigen::Isometry3d& camera_in_odom, const std::vector
   {
     if (of_track[t] != nullptr)
     {
-      append(tracks_[t], { camera_in_odom, *of_track[t] });
+      tracks_[t].add(*of_track[t]);
     }
   }
   if (tracks_.size() < 2)
@@ -157,38 +128,101 @@ void PlaneFilter::add(const Eigen::Isometry3d& camera_in_odom, const std::vector
   }
 }
 
-std::optional<PlaneEstimate> PlaneFilter::estimate() const
+void PlaneFilter::remember(const Measurement& measurement)
 {
-  if (tracks_.empty())
+  constexpr double PLACES_IN_WINDOW = 20.0;
+  constexpr std::size_t MOST_PLACES = 40;
+  if (!measurement.camera_in_odom)
+  {
+    measurements_.assign(1, measurement);
+    return;
+  }
+  const auto way_from = [&](const Measurement& other) {
+    return (other.camera_in_odom->translation() - measurement.camera_in_odom->translation()).norm();
+  };
+  while (!measurements_.empty() &&
+         (!measurements_.front().camera_in_odom || way_from(measurements_.front()) > params_.window ||
+          measurements_.size() >= static_cast<std::size_t>(params_.max_measurements)))
+  {
+    measurements_.pop_front();
+  }
+  measurements_.push_back(measurement);
+  if (places_.empty() || way_from(places_.back()) >= params_.window / PLACES_IN_WINDOW)
+  {
+    places_.push_back(measurement);
+  }
+  if (places_.size() > MOST_PLACES)
+  {
+    places_.pop_front();
+  }
+}
+
+Eigen::Vector3d PlaneFilter::normal() const
+{
+  return tracks_.empty() ? Eigen::Vector3d(Eigen::Vector3d::UnitZ()) : tracks_.front().normal();
+}
+
+std::optional<double> PlaneFilter::distance() const
+{
+  double squared_way = 0.0;
+  double change_by_way = 0.0;
+  double farthest = 0.0;
+  std::vector<EuclideanHomography> motions;
+  for (const Measurement& place : places_)
+  {
+    motions.push_back(motionBefore(place.calibrated, normal()));
+  }
+  for (std::size_t i = 0; i < places_.size(); ++i)
+  {
+    for (std::size_t j = 0; j < i; ++j)
+    {
+      const Eigen::Isometry3d moved = places_[i].camera_in_odom->inverse() * *places_[j].camera_in_odom;
+      const Eigen::Vector3d change =
+          motions[i].translation_over_distance - moved.linear() * motions[j].translation_over_distance;
+      squared_way += moved.translation().squaredNorm();
+      change_by_way += change.dot(moved.translation());
+      farthest = std::max(farthest, moved.translation().norm());
+    }
+  }
+  if (tracks_.empty() || !(farthest >= params_.window) || !(change_by_way > 0.0))
   {
     return std::nullopt;
   }
-  const Track& track = tracks_.front();
-  PlaneEstimate result;
-  result.ambiguous = tracks_.size() > 1;
-  result.motion.normal = track.normal();
-  if (track.way >= params_.window && track.squared_way > 0.0 && track.change_by_way > 0.0)
+  return squared_way / change_by_way;
+}
+
+std::optional<PlaneEstimate> PlaneFilter::estimate() const
+{
+  if (measurements_.empty())
   {
-    result.distance = track.squared_way / track.change_by_way;
+    return std::nullopt;
   }
-  const Measurement& last = track.measurements.back();
+  PlaneEstimate result;
+  result.normal_known = !tracks_.empty();
+  result.ambiguous = tracks_.size() > 1;
+  result.distance = distance();
+  const Measurement& last = measurements_.back();
+  result.motion = motionBefore(last.calibrated, normal());
+  if (!last.camera_in_odom)
+  {
+    return result;
+  }
   Eigen::Matrix3d rotations = Eigen::Matrix3d::Zero();
   Eigen::Vector3d translations = Eigen::Vector3d::Zero();
-  for (const Measurement& measurement : track.measurements)
+  for (const Measurement& measurement : measurements_)
   {
-    const Eigen::Isometry3d moved = last.camera_in_odom.inverse() * measurement.camera_in_odom;
-    rotations += moved.linear() * measurement.motion.rotation;
-    if (result.distance)
-    {
-      translations +=
-          moved.linear() * measurement.motion.translation_over_distance + moved.translation() / *result.distance;
-    }
+    const Eigen::Isometry3d moved = last.camera_in_odom->inverse() * *measurement.camera_in_odom;
+    const EuclideanHomography now = movedOn(motionBefore(measurement.calibrated, normal()), moved,
+                                            result.distance.value_or(std::numeric_limits<double>::infinity()));
+    rotations += now.rotation;
+    translations += now.translation_over_distance / static_cast<double>(measurements_.size());
   }
   result.motion.rotation = nearestRotation(rotations);
   // Without a distance, odometry does not tell how far the others have to be moved.
-  result.motion.translation_over_distance =
-      result.distance ? Eigen::Vector3d(translations / static_cast<double>(track.measurements.size()))
-                      : last.motion.translation_over_distance;
+  if (result.distance)
+  {
+    result.motion.translation_over_distance = translations;
+  }
   return result;
 }
 

@@ -134,7 +134,7 @@ class Drive
 {
 public:
   Drive(const Walls& walls, const HomingParams& params, const PlanarPose& start)
-    : walls_(walls), homing_(makeHoming(params, walls.target())), limiter_(BaseLimits()), base_(start)
+    : walls_(walls), homing_(makeHoming(params, walls.target())), limiter_(VelocityLimits()), base_(start)
   {
   }
 
@@ -226,7 +226,7 @@ public:
 private:
   const Walls& walls_;
   std::unique_ptr<Homing> homing_;
-  VelocityLimiter limiter_;
+  BaseVelocityLimiter limiter_;
   cv::Mat black_ = cv::Mat(Walls::HEIGHT, Walls::WIDTH, CV_8UC1, cv::Scalar(0));
   cv::Mat something_else_ = test::texturedPicture(99, cv::Size(Walls::WIDTH, Walls::HEIGHT));
   Rng rng_{ 5 };

@@ -21,7 +21,7 @@ constexpr double DT = 0.05;  // [s]
 constexpr double NOT_A_NUMBER = std::numeric_limits<double>::quiet_NaN();
 
 /** What remains after many steps. */
-BaseVelocity settled(VelocityLimiter& limiter, const BaseVelocity& wanted)
+BaseVelocity settled(BaseVelocityLimiter& limiter, const BaseVelocity& wanted)
 {
   BaseVelocity velocity = BaseVelocity::Zero();
   for (int i = 0; i < 200; ++i)
@@ -35,7 +35,7 @@ BaseVelocity settled(VelocityLimiter& limiter, const BaseVelocity& wanted)
 
 TEST(VelocityLimiter, GivesWhatIsAllowed)
 {
-  VelocityLimiter limiter{ BaseLimits() };
+  BaseVelocityLimiter limiter{ VelocityLimits() };
   const BaseVelocity wanted(0.1, -0.05, 0.3);
   EXPECT_TRUE(settled(limiter, wanted).isApprox(wanted, 1e-9));
   EXPECT_LT(settled(limiter, BaseVelocity::Zero()).norm(), 1e-12);
@@ -43,8 +43,8 @@ TEST(VelocityLimiter, GivesWhatIsAllowed)
 
 TEST(VelocityLimiter, ScalesTheWholeVelocity)
 {
-  const BaseLimits limits;
-  VelocityLimiter limiter(limits);
+  const VelocityLimits limits;
+  BaseVelocityLimiter limiter(limits);
   // Too fast by 4, its turn by less.
   const BaseVelocity fast(0.6, -0.8, 0.4);
   EXPECT_TRUE(settled(limiter, fast).isApprox(0.25 * fast, 1e-9));
@@ -55,7 +55,7 @@ TEST(VelocityLimiter, ScalesTheWholeVelocity)
 
 TEST(VelocityLimiter, KeepsTheDirectionWhileGatheringSpeed)
 {
-  VelocityLimiter limiter{ BaseLimits() };
+  BaseVelocityLimiter limiter{ VelocityLimits() };
   const BaseVelocity wanted(0.12, 0.16, -0.3);
   for (int i = 1; i <= 5; ++i)
   {
@@ -67,9 +67,9 @@ TEST(VelocityLimiter, KeepsTheDirectionWhileGatheringSpeed)
 
 TEST(VelocityLimiter, TurnsAccelerateByTheirOwnLimit)
 {
-  BaseLimits limits;
+  VelocityLimits limits;
   limits.max_turn_acceleration = 0.2;
-  VelocityLimiter limiter(limits);
+  BaseVelocityLimiter limiter(limits);
   EXPECT_NEAR(limiter.next({ 0.0, 0.0, 0.4 }, DT).z(), 0.2 * DT, 1e-12);
   limiter.stop();
   // Then the drive waits for the turn.
@@ -81,12 +81,12 @@ TEST(VelocityLimiter, TurnsAccelerateByTheirOwnLimit)
 RC_GTEST_PROP(VelocityLimiter, KeepsItsLimitsWhateverIsWanted, (std::uint64_t seed))
 {
   Rng rng(seed);
-  BaseLimits limits;
+  VelocityLimits limits;
   limits.max_speed = uniform(rng, 0.05, 1.0);
   limits.max_turn_rate = uniform(rng, 0.05, 1.0);
   limits.max_acceleration = uniform(rng, 0.05, 2.0);
   limits.max_turn_acceleration = uniform(rng, 0.05, 2.0);
-  VelocityLimiter limiter(limits);
+  BaseVelocityLimiter limiter(limits);
   BaseVelocity last = BaseVelocity::Zero();
   for (int i = 0; i < 100; ++i)
   {
@@ -109,7 +109,7 @@ TEST(VelocityLimiter, WhatIsNotFiniteStops)
   {
     for (int axis = 0; axis < 3; ++axis)
     {
-      VelocityLimiter limiter{ BaseLimits() };
+      BaseVelocityLimiter limiter{ VelocityLimits() };
       settled(limiter, { 0.2, 0.1, 0.3 });
       BaseVelocity wanted(0.1, 0.1, 0.1);
       wanted(axis) = bad;
@@ -122,7 +122,7 @@ TEST(VelocityLimiter, WhatIsNotFiniteStops)
 
 TEST(VelocityLimiter, StopIsAtOnce)
 {
-  VelocityLimiter limiter{ BaseLimits() };
+  BaseVelocityLimiter limiter{ VelocityLimits() };
   settled(limiter, { 0.2, 0.1, 0.3 });
   limiter.stop();
   EXPECT_EQ(limiter.next(BaseVelocity::Zero(), DT), BaseVelocity(BaseVelocity::Zero()));
@@ -131,16 +131,31 @@ TEST(VelocityLimiter, StopIsAtOnce)
 
 TEST(VelocityLimiter, NothingChangesInNoTime)
 {
-  VelocityLimiter limiter{ BaseLimits() };
+  BaseVelocityLimiter limiter{ VelocityLimits() };
   EXPECT_EQ(limiter.next({ 0.2, 0.0, 0.0 }, 0.0), BaseVelocity(BaseVelocity::Zero()));
   EXPECT_EQ(limiter.next({ 0.0, 0.0, 0.4 }, 0.0), BaseVelocity(BaseVelocity::Zero()));
   EXPECT_EQ(limiter.next({ 0.2, 0.0, 0.4 }, 0.0), BaseVelocity(BaseVelocity::Zero()));
 }
 
-TEST(BaseLimits, NameAllFaultsAtOnce)
+TEST(TwistLimiter, LimitsSpeedAndTurnInSpace)
 {
-  EXPECT_TRUE(BaseLimits().validate().empty());
-  const std::vector<std::string> faults = BaseLimits{ 0.0, -1.0, NOT_A_NUMBER, 0.0 }.validate();
+  TwistLimiter limiter{ VelocityLimits() };
+  Twist wanted;
+  wanted << 0.2, -0.2, 0.1, 0.8, 0.4, -0.8;  // 0.3 m/s and 1.2 rad/s: turns too fast by 3
+  Twist velocity = limiter.next(wanted, DT);
+  EXPECT_NEAR(velocity.tail<3>().norm(), 1.0 * DT, 1e-12);
+  EXPECT_TRUE(velocity.normalized().isApprox(wanted.normalized(), 1e-9));
+  for (int i = 0; i < 100; ++i)
+  {
+    velocity = limiter.next(wanted, DT);
+  }
+  EXPECT_TRUE(velocity.isApprox(wanted / 3.0, 1e-9));
+}
+
+TEST(VelocityLimits, NameAllFaultsAtOnce)
+{
+  EXPECT_TRUE(VelocityLimits().validate().empty());
+  const std::vector<std::string> faults = VelocityLimits{ 0.0, -1.0, NOT_A_NUMBER, 0.0 }.validate();
   ASSERT_EQ(faults.size(), 4U);
   const std::vector<std::string> names{ "max_speed", "max_turn_rate", "max_acceleration", "max_turn_acceleration" };
   for (std::size_t i = 0; i < names.size(); ++i)

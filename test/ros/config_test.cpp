@@ -52,7 +52,7 @@ TEST(Config, LineMatcherHasEveryParameterAtItsDefault)
 TEST(Config, HomingHasEveryParameterAtItsDefault)
 {
   HomingParams params;
-  BaseLimits limits;
+  VelocityLimits limits;
   expectEveryParameterAtItsDefault(
       "homing.yaml", homingParameters(params, limits),
       { "view", "views_dir", "base_frame", "point_matcher", "line_matcher", "dry_run", "timeout", "control_rate",

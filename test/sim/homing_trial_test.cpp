@@ -63,7 +63,7 @@ TEST(HomingTrial, ArrivesInTheDesksWorld)
   for (std::size_t i = 1; i < steps.size(); ++i)
   {
     EXPECT_GT(steps[i].time, steps[i - 1].time);
-    EXPECT_LE(steps[i].velocity.head<2>().norm(), BaseLimits().max_speed + 1e-9);
+    EXPECT_LE(steps[i].velocity.head<2>().norm(), VelocityLimits().max_speed + 1e-9);
   }
 }
 

@@ -70,7 +70,7 @@ public:
     return { motion.linear(), motion.translation() / DISTANCE, normal_ };
   }
 
-  std::vector<EuclideanHomography> measure(double part, double noise)
+  Eigen::Matrix3d measure(double part, double noise)
   {
     const Eigen::Matrix3d k = cameraMatrix();
     const Eigen::Matrix3d h = k * truth(part).matrix() * k.inverse();
@@ -83,7 +83,16 @@ public:
       pairs.push_back({ point, current });
     }
     const auto linear = homographyFromPoints(pairs);
-    return decomposeHomography(refineHomography(*linear, pairs), k, points_);
+    return refineHomography(*linear, pairs);
+  }
+
+  void addTo(PlaneFilter& filter, double part, double noise)
+  {
+    filter.add(cameraInOdom(part), measure(part, noise), cameraMatrix(), points_);
+  }
+  const Points& points() const
+  {
+    return points_;
   }
 
   static constexpr double DISTANCE = 0.7;  // [m]
@@ -119,13 +128,18 @@ TEST(PlaneFilter, KnowsNothingAtFirst)
 {
   PlaneFilter filter{ PlaneFilterParams() };
   EXPECT_FALSE(filter.estimate());
-  filter.add(Eigen::Isometry3d::Identity(), {});
+  const Points seen{ { 200.0, 200.0 }, { 400.0, 300.0 } };
+  const Eigen::Matrix3d mirror = Eigen::Vector3d(-1.0, 1.0, 1.0).asDiagonal();
+  filter.add(Eigen::Isometry3d::Identity(), mirror, cameraMatrix(), seen);
   EXPECT_FALSE(filter.estimate());
-  // A camera that has only turned tells no plane.
-  filter.add(Eigen::Isometry3d::Identity(),
-             { { Eigen::Matrix3d::Identity(), Eigen::Vector3d::Zero(),
-                 Eigen::Vector3d::Constant(std::numeric_limits<double>::quiet_NaN()) } });
-  EXPECT_FALSE(filter.estimate());
+  // A camera that has only turned tells its rotation, but no plane.
+  const Eigen::Matrix3d turn = Eigen::AngleAxisd(0.2, Eigen::Vector3d(0.6, 0.0, 0.8)).toRotationMatrix();
+  filter.add(Eigen::Isometry3d::Identity(), cameraMatrix() * turn * cameraMatrix().inverse(), cameraMatrix(), seen);
+  ASSERT_TRUE(filter.estimate());
+  EXPECT_FALSE(filter.estimate()->normal_known);
+  EXPECT_FALSE(filter.estimate()->distance);
+  EXPECT_LT(rotationError(filter.estimate()->motion.rotation, turn), 1e-9);
+  EXPECT_LT(filter.estimate()->motion.translation_over_distance.norm(), 1e-9);
 }
 
 TEST(PlaneFilter, FindsPlaneDistanceAndMotionOnTheWay)
@@ -140,8 +154,8 @@ TEST(PlaneFilter, FindsPlaneDistanceAndMotionOnTheWay)
     for (int i = 0; i <= STEPS; ++i)
     {
       const double part = 0.9 * i / STEPS;
-      const auto solutions = approach.measure(part, 0.3);
-      filter.add(approach.cameraInOdom(part), solutions);
+      const Eigen::Matrix3d h = approach.measure(part, 0.3);
+      filter.add(approach.cameraInOdom(part), h, cameraMatrix(), approach.points());
       const auto estimate = filter.estimate();
       ASSERT_TRUE(estimate) << seed;
       if (!estimate->ambiguous)
@@ -156,7 +170,7 @@ TEST(PlaneFilter, FindsPlaneDistanceAndMotionOnTheWay)
         EXPECT_GT(estimate->motion.normal.dot(approach.normal()), std::cos(3.0 * DEGREE)) << seed << ", " << i;
         const EuclideanHomography truth = approach.truth(part);
         double best = 1e9;
-        for (const EuclideanHomography& solution : solutions)
+        for (const EuclideanHomography& solution : decomposeHomography(h, cameraMatrix(), approach.points()))
         {
           best = std::min(best, rotationError(solution.rotation, truth.rotation));
         }
@@ -175,10 +189,49 @@ TEST(PlaneFilter, TellsNoDistanceBeforeTheCameraHasMovedEnough)
   PlaneFilter filter{ PlaneFilterParams() };
   for (int i = 0; i < 40; ++i)
   {
-    filter.add(approach.cameraInOdom(0.2), approach.measure(0.2, 0.3));
+    approach.addTo(filter, 0.2, 0.3);
     ASSERT_TRUE(filter.estimate());
     EXPECT_FALSE(filter.estimate()->distance);
   }
+}
+
+TEST(PlaneFilter, KeepsItsPlaneWhereTheViewsAgree)
+{
+  for (std::uint64_t seed = 1; seed <= 10; ++seed)
+  {
+    Approach approach(seed);
+    PlaneFilter filter{ PlaneFilterParams() };
+    for (int i = 0; i <= 80; ++i)
+    {
+      approach.addTo(filter, i / 80.0, 0.1);
+    }
+    for (int i = 0; i < 100; ++i)
+    {
+      approach.addTo(filter, 1.0, 0.1);  // no decomposition tells anything here
+    }
+    const auto estimate = filter.estimate();
+    ASSERT_TRUE(estimate && estimate->distance) << seed;
+    EXPECT_NEAR(*estimate->distance, Approach::DISTANCE, 0.03 * Approach::DISTANCE) << seed;
+    EXPECT_GT(estimate->motion.normal.dot(approach.normal()), std::cos(2.0 * DEGREE)) << seed;
+    EXPECT_LT(rotationError(estimate->motion.rotation, Eigen::Matrix3d::Identity()), 0.05 * DEGREE) << seed;
+    EXPECT_LT(estimate->motion.translation_over_distance.norm(), 1e-3) << seed;
+  }
+}
+
+TEST(PlaneFilter, DoesWithoutOdometry)
+{
+  Approach approach(4);
+  PlaneFilter filter{ PlaneFilterParams() };
+  for (int i = 0; i <= 60; ++i)
+  {
+    const double part = i / 80.0;
+    filter.add(std::nullopt, approach.measure(part, 0.2), cameraMatrix(), approach.points());
+  }
+  const auto estimate = filter.estimate();
+  ASSERT_TRUE(estimate);
+  EXPECT_FALSE(estimate->distance);
+  EXPECT_GT(estimate->motion.normal.dot(approach.normal()), std::cos(3.0 * DEGREE));
+  EXPECT_LT(rotationError(estimate->motion.rotation, approach.truth(0.75).rotation), 0.3 * DEGREE);
 }
 
 TEST(PlaneFilter, StaysAmbiguousWhereNothingTells)
@@ -188,14 +241,14 @@ TEST(PlaneFilter, StaysAmbiguousWhereNothingTells)
   for (std::uint64_t seed = 1; seed <= 20; ++seed)
   {
     Approach approach(seed);
-    if (approach.measure(0.1, 0.0).size() != 2U)
+    if (decomposeHomography(approach.measure(0.1, 0.0), cameraMatrix(), approach.points()).size() != 2U)
     {
       continue;
     }
     PlaneFilter filter{ PlaneFilterParams() };
     for (int i = 0; i < 30; ++i)
     {
-      filter.add(approach.cameraInOdom(0.1), approach.measure(0.1, 0.02));
+      approach.addTo(filter, 0.1, 0.02);
     }
     ++ambiguous;
     EXPECT_TRUE(filter.estimate()->ambiguous) << seed;

@@ -11,6 +11,6 @@
 namespace view_servo
 {
 /** The parameters of homing and of the base it drives by name, bound to what is given, which must outlive the table. */
-std::vector<Parameter> homingParameters(HomingParams& params, BaseLimits& limits);
+std::vector<Parameter> homingParameters(HomingParams& params, VelocityLimits& limits);
 
 }  // namespace view_servo

@@ -4,6 +4,7 @@
 
 #include <Eigen/Core>
 
+#include <algorithm>
 #include <string>
 #include <vector>
 
@@ -12,8 +13,11 @@ namespace view_servo
 /** A base's velocity: (v_x, v_y, turn rate) in base_link [m/s, m/s, rad/s]. */
 using BaseVelocity = Eigen::Vector3d;
 
-/** What a base may do. */
-struct BaseLimits
+/** A camera's velocity: [v; ω] in its optical frame [m/s, rad/s]. */
+using Twist = Eigen::Matrix<double, 6, 1>;
+
+/** What a base or a camera may do. */
+struct VelocityLimits
 {
   double max_speed = 0.25;             ///< [m/s], > 0
   double max_turn_rate = 0.4;          ///< [rad/s], > 0
@@ -24,17 +28,36 @@ struct BaseLimits
   std::vector<std::string> validate() const;
 };
 
-/** Keeps commands within limits: the whole velocity is scaled, so that its direction stays, and changes gradually. */
+/**
+ * Keeps commands within limits: the whole velocity is scaled, so that its direction stays, and changes gradually. Its
+ * first `LINEAR` numbers are a speed, the others, `ANGULAR` of them, a turn rate.
+ */
+template <int LINEAR, int ANGULAR>
 class VelocityLimiter
 {
 public:
+  using Velocity = Eigen::Matrix<double, LINEAR + ANGULAR, 1>;
+
   /** The limits must be valid. */
-  explicit VelocityLimiter(const BaseLimits& limits) : limits_(limits)
+  explicit VelocityLimiter(const VelocityLimits& limits) : limits_(limits)
   {
   }
 
   /** The velocity allowed after `dt` [s] on the way to the one wanted. Not finite: zero. */
-  BaseVelocity next(const BaseVelocity& wanted, double dt);
+  Velocity next(const Velocity& wanted, double dt)
+  {
+    if (!wanted.allFinite())
+    {
+      velocity_.setZero();
+    }
+    else if (dt > 0.0)
+    {
+      const Velocity allowed = scaleWithin(wanted, limits_.max_speed, limits_.max_turn_rate) * wanted;
+      const Velocity change = allowed - velocity_;
+      velocity_ += scaleWithin(change, dt * limits_.max_acceleration, dt * limits_.max_turn_acceleration) * change;
+    }
+    return velocity_;
+  }
 
   /** Zero at once. */
   void stop()
@@ -43,8 +66,19 @@ public:
   }
 
 private:
-  BaseLimits limits_;
-  BaseVelocity velocity_ = BaseVelocity::Zero();
+  /** The factor that brings a velocity within limits, at most 1. */
+  static double scaleWithin(const Velocity& velocity, double linear, double angular)
+  {
+    const double excess =
+        std::max(velocity.template head<LINEAR>().norm() / linear, velocity.template tail<ANGULAR>().norm() / angular);
+    return excess > 1.0 ? 1.0 / excess : 1.0;
+  }
+
+  VelocityLimits limits_;
+  Velocity velocity_ = Velocity::Zero();
 };
+
+using BaseVelocityLimiter = VelocityLimiter<2, 1>;
+using TwistLimiter = VelocityLimiter<3, 3>;
 
 }  // namespace view_servo

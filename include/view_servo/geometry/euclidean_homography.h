@@ -5,6 +5,7 @@
 #include "view_servo/geometry/correspondence.h"
 
 #include <Eigen/Core>
+#include <Eigen/Geometry>
 
 #include <vector>
 
@@ -26,6 +27,30 @@ struct EuclideanHomography
     return rotation + translation_over_distance * normal.transpose();
   }
 };
+
+/** The rotation nearest to a matrix of rank two or three (orthogonal Procrustes, Golub & Van Loan). */
+Eigen::Matrix3d nearestRotation(const Eigen::Matrix3d& matrix);
+
+/**
+ * H in normalised coordinates, scaled to R + (t / d) nᵀ: its middle singular value is 1, and points seen lie in front.
+ * @param h x_cur ~ H x_ref, 3x3, in pixels, any scale. @param k camera matrix of both images.
+ * @param seen points of the reference image that lie on the plane [px]; not empty.
+ */
+Eigen::Matrix3d calibratedHomography(const Eigen::Matrix3d& h, const Eigen::Matrix3d& k, const Points& seen);
+
+/**
+ * The motion between two cameras that see a plane of known normal: what a homography does along the plane is the rotation
+ * alone, however short the translation is.
+ * @param calibrated of calibratedHomography(). @param normal unit vector in the reference camera's frame.
+ */
+EuclideanHomography motionBefore(const Eigen::Matrix3d& calibrated, const Eigen::Vector3d& normal);
+
+/**
+ * The homography after the current camera has moved on (thesis eq. 8.3).
+ * @param motion X_next = motion X_cur [m]. @param distance d, of the plane from the reference camera [m]; infinity when it
+ * is not known: then only the turn counts.
+ */
+EuclideanHomography movedOn(const EuclideanHomography& homography, const Eigen::Isometry3d& motion, double distance);
 
 /**
  * The motions and planes that a homography can come from: of the two physical decompositions those before whose plane all

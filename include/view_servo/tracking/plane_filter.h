@@ -18,7 +18,7 @@ namespace view_servo
 /** Options of the filter of planes and motions. */
 struct PlaneFilterParams
 {
-  double window = 0.1;        ///< way of the camera whose measurements are averaged, and that d takes first [m], > 0
+  double window = 0.1;        ///< way of the camera whose measurements are averaged, and that d takes [m], > 0
   int max_measurements = 60;  ///< averaged at most, >= 2
   double decision = 4.0;  ///< times by which the normals of one decomposition must scatter more than the other's, > 1
 
@@ -30,16 +30,18 @@ struct PlaneFilterParams
 struct PlaneEstimate
 {
   EuclideanHomography motion;      ///< X_cur = R X_ref + t of the last camera, averaged
+  bool normal_known = false;       ///< else a plane that faces the reference camera is taken
   bool ambiguous = false;          ///< another decomposition is as likely
   std::optional<double> distance;  ///< d, of the plane from the reference camera [m]; empty until it is known
 };
 
 /**
  * Averages what the homographies of a moving camera say (thesis 8.5), with its odometry. The normal is the same in the
- * reference frame whatever the camera does; rotations and translations of the last part of the way are moved into the
- * last camera by odometry, where rotations are averaged by orthogonal Procrustes. d follows from how much the translation
- * over d changes for how far odometry says the camera has moved, t2/d - dR t1/d = dt/d: in least squares for 1/d, as the
- * image's part of it is noisier than odometry's, which would make d too small the other way round.
+ * reference frame whatever the camera does; once it is known, each homography tells its motion by it, also where the views
+ * nearly agree and a decomposition would say nothing. Rotations and translations of the last part of the way are moved
+ * into the last camera by odometry, where rotations are averaged by orthogonal Procrustes. d follows from how much the
+ * translation over d changes for how far odometry says the camera has moved, t2/d - dR t1/d = dt/d: in least squares for
+ * 1/d, as the image's part of it is noisier than odometry's, which would make d too small the other way round.
  *
  * Where a homography has two decompositions, both are followed by their normals. The true one stays where it is in the
  * reference frame, the other wanders as the camera moves: when it has scattered clearly more, or cannot be seen any more,
@@ -52,10 +54,13 @@ public:
   explicit PlaneFilter(const PlaneFilterParams& params);
 
   /**
-   * @param camera_in_odom pose of the camera in a frame that does not jump.
-   * @param solutions of decomposeHomography(); without any, or without a normal, nothing changes.
+   * A homography that is none of a plane before the camera changes nothing.
+   * @param camera_in_odom pose of the camera in a frame that does not jump; empty without odometry: then nothing but the
+   * normal is averaged.
+   * @param h, k, seen as of decomposeHomography().
    */
-  void add(const Eigen::Isometry3d& camera_in_odom, const std::vector<EuclideanHomography>& solutions);
+  void add(const std::optional<Eigen::Isometry3d>& camera_in_odom, const Eigen::Matrix3d& h, const Eigen::Matrix3d& k,
+           const Points& seen);
 
   /** Empty before the first measurement. */
   std::optional<PlaneEstimate> estimate() const;
@@ -63,20 +68,18 @@ public:
 private:
   struct Measurement
   {
-    Eigen::Isometry3d camera_in_odom;
-    EuclideanHomography motion;
+    std::optional<Eigen::Isometry3d> camera_in_odom;
+    Eigen::Matrix3d calibrated;  // H in normalised coordinates
   };
 
   /** One decomposition through time. */
   struct Track
   {
-    std::deque<Measurement> measurements;  // of the window, newest last
-    Eigen::Vector3d normals = Eigen::Vector3d::Zero();
+    Eigen::Vector3d normals = Eigen::Vector3d::Zero();  // weighted sum
+    double weight = 0.0;
     std::size_t count = 0;
-    double squared_way = 0.0;  // sums of the equations of 1 / d
-    double change_by_way = 0.0;
-    double way = 0.0;
 
+    void add(const EuclideanHomography& solution);
     Eigen::Vector3d normal() const
     {
       return normals.normalized();
@@ -85,10 +88,16 @@ private:
     double scatter() const;
   };
 
-  void append(Track& track, const Measurement& measurement) const;
+  void followNormals(const std::vector<EuclideanHomography>& solutions);
+  void remember(const Measurement& measurement);
+  /** Of the plane, as far as it is known. */
+  Eigen::Vector3d normal() const;
+  std::optional<double> distance() const;
 
   PlaneFilterParams params_;
-  std::vector<Track> tracks_;  // one or two; the likelier first
+  std::vector<Track> tracks_;             // none, one or two; the likelier first
+  std::deque<Measurement> measurements_;  // of the window, newest last
+  std::deque<Measurement> places_;        // apart from each other, also when the camera stands; newest last
 };
 
 }  // namespace view_servo

@@ -1,0 +1,110 @@
+// Copyright (c) 2026, the view_servo authors
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include "view_servo/tracking/homography_tracker.h"
+#include "view_servo/tracking/plane_filter.h"
+
+#include <Eigen/Core>
+#include <Eigen/Geometry>
+#include <opencv2/core/mat.hpp>
+#include <opencv2/core/types.hpp>
+
+#include <optional>
+#include <string>
+#include <vector>
+
+namespace view_servo
+{
+/** Options of following a plane from image to image. */
+struct PlaneTrackerParams
+{
+  HomographyTrackerParams tracker;
+  PlaneFilterParams filter;
+  int lost_after = 5;  ///< images in a row without the plane, >= 1
+
+  /** All faults, one a line; empty when the parameters are usable. */
+  std::vector<std::string> validate() const;
+};
+
+enum class TrackingState
+{
+  SEARCHING,  ///< not found in this image
+  TRACKING,   ///< found
+  LOST        ///< was found before, and has not been for `lost_after` images
+};
+
+/** What is known after an image. */
+struct PlaneTrack
+{
+  TrackingState state = TrackingState::SEARCHING;
+  TrackedHomography homography;        ///< found if and only if the state is TRACKING
+  std::optional<PlaneEstimate> plane;  ///< of this image; empty unless TRACKING
+};
+
+/**
+ * Follows the plane of a stored view through the images of a moving camera (thesis ch. 8). Each homography is predicted by
+ * odometry from the last one that was found, ΔH = K (ΔR + Δt nᵀ / d) K⁻¹ with the plane in the frame of that last camera,
+ * looked for against the stored view, and gives the filter of plane and motion its next measurement. Until d is known
+ * only the turn is predicted; without odometry, that nothing has moved.
+ *
+ * A plane that is hidden is looked for on and on where odometry says it is. When that is in vain for too long, somebody has
+ * to find it anew: start().
+ */
+class PlaneTracker
+{
+public:
+  /**
+   * @param k camera matrix of the stored view and of all images, without distortion [px].
+   * @throws what HomographyTracker throws, std::invalid_argument with all faults of the parameters.
+   */
+  PlaneTracker(const cv::Mat& reference, const cv::Rect& region, const Eigen::Matrix3d& k,
+               const PlaneTrackerParams& params);
+
+  /**
+   * Where the plane was found by other means, in an image no older than the last one added as long as that showed it: then
+   * nothing changes, since tracking knows better.
+   * @param h x_cur ~ H x_ref [px]. @param camera_in_odom of that image.
+   */
+  void start(const Eigen::Matrix3d& h, const std::optional<Eigen::Isometry3d>& camera_in_odom);
+
+  /**
+   * The next image.
+   * @param image 8-bit, one channel. @param camera_in_odom pose of the camera at that time in a frame that does not jump,
+   * empty where odometry does not know.
+   * @throws std::invalid_argument when the image has the wrong type.
+   */
+  const PlaneTrack& add(const cv::Mat& image, const std::optional<Eigen::Isometry3d>& camera_in_odom);
+
+  const PlaneTrack& track() const
+  {
+    return track_;
+  }
+
+  /** The corners of the stored view that are tracked [px]. */
+  const std::vector<Eigen::Vector2d>& points() const
+  {
+    return tracker_.points();
+  }
+
+private:
+  /** Where the plane was found last. */
+  struct Place
+  {
+    Eigen::Matrix3d h;
+    std::optional<Eigen::Isometry3d> camera_in_odom;
+  };
+
+  Eigen::Matrix3d predict(const std::optional<Eigen::Isometry3d>& camera_in_odom) const;
+
+  PlaneTrackerParams params_;
+  Eigen::Matrix3d k_;
+  HomographyTracker tracker_;
+  PlaneFilter filter_;
+  std::optional<Place> last_;
+  bool found_once_ = false;
+  int missed_ = 0;
+  PlaneTrack track_;
+};
+
+}  // namespace view_servo

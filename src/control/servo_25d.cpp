@@ -1,0 +1,260 @@
+// Copyright (c) 2026, the view_servo authors
+// SPDX-License-Identifier: BSD-3-Clause
+#include "view_servo/control/servo_25d.h"
+
+#include "view_servo/geometry/faults.h"
+
+#include <visp3/core/vpColVector.h>
+#include <visp3/core/vpThetaUVector.h>
+#include <visp3/visual_features/vpFeatureDepth.h>
+#include <visp3/visual_features/vpFeaturePoint.h>
+#include <visp3/visual_features/vpFeatureThetaU.h>
+#include <visp3/vs/vpAdaptiveGain.h>
+#include <visp3/vs/vpServo.h>
+#include <Eigen/Geometry>
+#include <Eigen/LU>
+
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+#include <stdexcept>
+#include <utility>
+
+namespace view_servo
+{
+namespace
+{
+constexpr double DEGREES = 180.0 / M_PI;
+
+Eigen::Vector3d thetaU(const Eigen::Matrix3d& rotation)
+{
+  const Eigen::AngleAxisd turn(rotation);
+  return turn.angle() * turn.axis();
+}
+
+/** The displacement of a body that moves by a twist of its own for a time: where its frame is in the former one. */
+Eigen::Isometry3d displacement(const Twist& twist, double duration)
+{
+  const Eigen::Vector3d way = duration * twist.head<3>();
+  const Eigen::Vector3d turn = duration * twist.tail<3>();
+  const double angle = turn.norm();
+  Eigen::Isometry3d result = Eigen::Isometry3d::Identity();
+  result.translation() = way;
+  if (angle > 1e-9)
+  {
+    const Eigen::Vector3d axis = turn / angle;
+    result.linear() = Eigen::AngleAxisd(angle, axis).toRotationMatrix();
+    // The exponential of the twist: along the axis straight, across it on an arc.
+    const Eigen::Vector3d across = way - axis.dot(way) * axis;
+    result.translation() =
+        axis.dot(way) * axis + std::sin(angle) / angle * across + (1.0 - std::cos(angle)) / angle * axis.cross(across);
+  }
+  return result;
+}
+
+std::string describe(double translation, double rotation)
+{
+  char text[100];
+  std::snprintf(text, sizeof(text), "%.2f mm and %.3f degrees from the view", 1e3 * translation, DEGREES * rotation);
+  return text;
+}
+
+}  // namespace
+
+std::vector<std::string> Servo25dParams::validate() const
+{
+  Faults faults;
+  faults.require(gain > 0.0, "gain must be more than 0 1/s");
+  faults.require(near_gain >= gain, "near_gain must be at least gain");
+  faults.require(margin >= 0.0 && margin <= 0.3, "margin must lie in [0, 0.3]");
+  faults.require(distance > 0.0, "distance must be more than 0 m");
+  faults.require(translation_tolerance > 0.0, "translation_tolerance must be more than 0 m");
+  faults.require(rotation_tolerance > 0.0, "rotation_tolerance must be more than 0 rad");
+  faults.require(dwell >= 0.0, "dwell must not be negative");
+  faults.require(lost_timeout > 0.0, "lost_timeout must be more than 0 s");
+  return faults.list();
+}
+
+Servo25dError servo25dError(const EuclideanHomography& motion, const Eigen::Vector2d& point)
+{
+  const Eigen::Vector3d seen = motion.matrix() * point.homogeneous();
+  // X_cur = Z* (R + t nᵀ / d) m*: the third number is the ratio of the depths.
+  return { seen.hnormalized() - point, std::log(seen.z()), thetaU(motion.rotation.transpose()) };
+}
+
+/** ViSP's task: the features stay, their values change. */
+struct Servo25d::Task
+{
+  vpFeaturePoint point;
+  vpFeaturePoint wanted_point;
+  vpFeatureDepth depth;
+  vpFeatureThetaU turn{ vpFeatureThetaU::cdRc };
+  vpServo servo;
+
+  explicit Task(const Servo25dParams& params)
+  {
+    constexpr double SLOPE = 8.0;  // of the gain where there is no error [1/s]
+    servo.setServo(vpServo::EYEINHAND_CAMERA);
+    servo.setInteractionMatrixType(vpServo::CURRENT, vpServo::PSEUDO_INVERSE);
+    servo.setLambda(vpAdaptiveGain(params.near_gain, params.gain, SLOPE));
+    servo.addFeature(point, wanted_point);
+    servo.addFeature(depth);
+    servo.addFeature(turn);
+  }
+};
+
+Servo25d::Servo25d(const ServoTarget& target, const Servo25dParams& params)
+  : params_(params), target_(target), chosen_((target.k.inverse() * target.point.homogeneous()).hnormalized())
+{
+  requireNoFaults("parameters of 2.5D servoing", params.validate());
+  if (!(gainsAt(target.point).minCoeff() > 0.0))
+  {
+    throw std::invalid_argument("the chosen point of the view is outside the image or within its margin");
+  }
+  task_ = std::make_unique<Task>(params);
+}
+
+Servo25d::~Servo25d() = default;
+
+Eigen::Vector2d Servo25d::gainsAt(const Eigen::Vector2d& pixel) const
+{
+  Eigen::Vector2d gains;
+  for (int i = 0; i < 2; ++i)
+  {
+    // Of the image's size: how far inside the margin the point is. The gain rises over as much as the margin is wide, less
+    // where the chosen point's own place is nearer to it, where nothing may hold the camera back.
+    const auto inside = [&](double at) {
+      return std::min(at, target_.size(i) - 1.0 - at) / target_.size(i) - params_.margin;
+    };
+    const double ramp = std::min(std::max(params_.margin, 0.05), inside(target_.point(i)));
+    gains(i) = ramp > 0.0 ? std::clamp(inside(pixel(i)) / ramp, 0.0, 1.0) : 0.0;
+  }
+  return gains;
+}
+
+double Servo25d::distance() const
+{
+  return distance_.value_or(params_.distance);
+}
+
+void Servo25d::add(const PlaneView& view)
+{
+  if (report_.state == ServoState::FAILED || (view_ && view.stamp < view_->stamp))
+  {
+    return;
+  }
+  view_ = view;
+  if (view.distance)
+  {
+    distance_ = view.distance;
+  }
+  lost_since_.reset();
+  judge(view.stamp);
+}
+
+void Servo25d::judge(double stamp)
+{
+  const Servo25dError error = servo25dError(view_->motion, chosen_);
+  report_.error = error;
+  report_.point = (target_.k * (chosen_ + error.point).homogeneous()).hnormalized();
+  report_.gains = gainsAt(report_.point);
+  report_.point_error = (report_.point - target_.point).norm();
+  report_.rotation_error = error.rotation.norm();
+  report_.translation_error = view_->motion.translation_over_distance.norm() * distance();
+  report_.inliers = view_->inliers;
+  const bool within = report_.translation_error <= params_.translation_tolerance &&
+                      report_.rotation_error <= params_.rotation_tolerance;
+  if (!within)
+  {
+    within_since_.reset();
+  }
+  else if (!within_since_)
+  {
+    within_since_ = stamp;
+  }
+  const bool converged = within && stamp - *within_since_ >= params_.dwell;
+  report_.state = converged ? ServoState::CONVERGED : ServoState::SERVOING;
+  report_.reason = describe(report_.translation_error, report_.rotation_error);
+  if (!distance_)
+  {
+    report_.reason += ", if its plane is " + std::to_string(params_.distance).substr(0, 4) + " m away";
+  }
+}
+
+void Servo25d::addLoss(double stamp, const std::string& reason)
+{
+  if (report_.state == ServoState::FAILED)
+  {
+    return;
+  }
+  lost_since_ = lost_since_.value_or(stamp);
+  within_since_.reset();
+  report_.inliers = 0;
+  if (stamp - *lost_since_ > params_.lost_timeout)
+  {
+    report_.state = ServoState::FAILED;
+    report_.reason = std::string(view_ ? "the view is lost: " : "the view is not found: ") + reason;
+    return;
+  }
+  report_.state = view_ ? ServoState::LOST : ServoState::ACQUIRING;
+  report_.reason = reason;
+}
+
+void Servo25d::sent(double time, const Twist& twist)
+{
+  constexpr double KEPT = 2.0;  // [s]
+  if (!sent_.empty() && time < sent_.back().time)
+  {
+    sent_.clear();  // time has gone back
+  }
+  sent_.push_back({ time, twist });
+  while (sent_.size() > 1 && sent_[1].time < time - KEPT)
+  {
+    sent_.pop_front();
+  }
+}
+
+Eigen::Isometry3d Servo25d::motionSince(double begin, double end) const
+{
+  Eigen::Isometry3d camera = Eigen::Isometry3d::Identity();  // in its frame at the beginning
+  for (std::size_t i = 0; i < sent_.size(); ++i)
+  {
+    const double from = std::max(begin, sent_[i].time);
+    const double to = i + 1 < sent_.size() ? std::min(end, sent_[i + 1].time) : end;
+    if (to > from)
+    {
+      camera = camera * displacement(sent_[i].twist, to - from);
+    }
+  }
+  return camera.inverse();
+}
+
+Twist Servo25d::command(double time)
+{
+  constexpr double LONGEST = 0.5;  // that an image is fed forward [s]
+  if (report_.state != ServoState::SERVOING && report_.state != ServoState::CONVERGED)
+  {
+    return Twist::Zero();
+  }
+  const double until = std::min(time, view_->stamp + LONGEST);
+  const EuclideanHomography now = movedOn(view_->motion, motionSince(view_->stamp, until), distance());
+  const Servo25dError error = servo25dError(now, chosen_);
+  const double depth = distance() / now.normal.dot(chosen_.homogeneous()) * std::exp(error.depth);
+  const Eigen::Vector2d at = chosen_ + error.point;
+  if (!at.allFinite() || !std::isfinite(depth) || !(depth > 0.0) || !error.rotation.allFinite())
+  {
+    return Twist::Zero();
+  }
+  const double slow_down = gainsAt((target_.k * at.homogeneous()).hnormalized()).minCoeff();
+  const Eigen::Vector3d turn = slow_down * error.rotation;
+  vpThetaUVector turn_left(turn.x(), turn.y(), turn.z());
+  task_->point.buildFrom(at.x(), at.y(), depth);
+  task_->wanted_point.buildFrom(chosen_.x(), chosen_.y(), depth);
+  task_->depth.buildFrom(at.x(), at.y(), depth, slow_down * error.depth);
+  task_->turn.buildFrom(turn_left);
+  const vpColVector twist = task_->servo.computeControlLaw();
+  const Twist result = Eigen::Map<const Twist>(twist.data);
+  return result.allFinite() ? result : Twist(Twist::Zero());
+}
+
+}  // namespace view_servo
