@@ -68,9 +68,13 @@ ArmOutcome ArmTrials::run(const Eigen::Isometry3d& start, const std::function<vo
   puma_params.hand_eye_rotation_error = conditions.hand_eye_rotation_error;
   puma_params.seed = params_.seed;
   Puma puma(urdf_xml_, puma_params);
-  if (!puma.setCameraPose(world_.robot_base.inverse() * start))
+  // As the one who stores the view does: first there, then away.
+  for (const Eigen::Isometry3d& pose : { world_.goal, start })
   {
-    throw std::invalid_argument("the arm cannot bring its camera to the start");
+    if (!puma.setCameraPose(world_.robot_base.inverse() * pose))
+    {
+      throw std::invalid_argument("the arm cannot bring its camera to the goal or the start");
+    }
   }
   const auto camera_pose = [&] {
     return world_.robot_base * puma.cameraPose();

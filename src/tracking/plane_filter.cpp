@@ -4,6 +4,8 @@
 
 #include "view_servo/geometry/faults.h"
 
+#include <Eigen/LU>
+
 #include <algorithm>
 #include <cmath>
 #include <iterator>
@@ -42,13 +44,13 @@ PlaneFilter::PlaneFilter(const PlaneFilterParams& params) : params_(params)
 void PlaneFilter::add(const std::optional<Eigen::Isometry3d>& camera_in_odom, const Eigen::Matrix3d& h,
                       const Eigen::Matrix3d& k, const Points& seen)
 {
-  const std::vector<EuclideanHomography> solutions = decomposeHomography(h, k, seen);
-  if (solutions.empty())
+  const Eigen::Matrix3d calibrated = calibratedHomography(h, k, seen);
+  if (!calibrated.allFinite() || !(calibrated.determinant() > 0.0))
   {
     return;
   }
-  followNormals(solutions);
-  remember({ camera_in_odom, calibratedHomography(h, k, seen) });
+  followNormals(decomposeHomography(h, k, seen));  // none, as a rule, where the views agree
+  remember({ camera_in_odom, calibrated });
 }
 
 void PlaneFilter::followNormals(const std::vector<EuclideanHomography>& solutions)

@@ -54,7 +54,7 @@ public:
   explicit PlaneFilter(const PlaneFilterParams& params);
 
   /**
-   * A homography that is none of a plane before the camera changes nothing.
+   * A homography that shows the plane from behind changes nothing.
    * @param camera_in_odom pose of the camera in a frame that does not jump; empty without odometry: then nothing but the
    * normal is averaged.
    * @param h, k, seen as of decomposeHomography().
