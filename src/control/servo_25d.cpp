@@ -143,6 +143,11 @@ void Servo25d::add(const PlaneView& view)
   {
     return;
   }
+  if (!view.motion.matrix().allFinite() || (view.distance && !(*view.distance > 0.0)))
+  {
+    addLoss(view.stamp, "the homography is not finite");
+    return;
+  }
   view_ = view;
   if (view.distance)
   {

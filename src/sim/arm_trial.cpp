@@ -97,6 +97,7 @@ ArmOutcome ArmTrials::run(const Eigen::Isometry3d& start, const std::function<vo
   Twist sent = Twist::Zero();
   ArmOutcome outcome;
   std::optional<double> end;
+  std::string hindered;  // by a joint
   double time = 0.0;
   for (; time < params_.max_duration && (!end || time < *end + SETTLING); time += STEP)
   {
@@ -164,10 +165,18 @@ ArmOutcome ArmTrials::run(const Eigen::Isometry3d& start, const std::function<vo
       puma.command(sent);
     }
     puma.step(STEP);
+    if (!end && puma.state() == Puma::State::AT_LIMIT)
+    {
+      end = time;
+      hindered = puma.message();
+      puma.halt();
+    }
   }
   const Eigen::Isometry3d error = world_.goal.inverse() * camera_pose();
-  outcome.converged = servo.report().state == ServoState::CONVERGED;
-  outcome.reason = end ? servo.report().reason : "not there in time: " + servo.report().reason;
+  outcome.converged = hindered.empty() && servo.report().state == ServoState::CONVERGED;
+  outcome.reason = !hindered.empty() ? hindered
+                   : end             ? servo.report().reason
+                                     : "not there in time: " + servo.report().reason;
   outcome.translation_error = error.translation().norm();
   outcome.rotation_error = Eigen::AngleAxisd(error.linear()).angle();
   outcome.duration = end ? *end : time;

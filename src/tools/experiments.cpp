@@ -5,6 +5,7 @@
  * Re-runs the thesis' experiments on this implementation: `experiments NAME [--out DIR]` writes NAME.csv, and NAME.png
  * beside it, drawn by plot_experiment; `--list` names them. Those that need real images read them from VIEW_SERVO_DATA.
  */
+#include "arm_experiments.h"
 #include "cyclic_order_experiment.h"
 #include "homing_experiments.h"
 #include "hypothesis_experiments.h"
@@ -175,6 +176,7 @@ const std::vector<Experiment>& experiments()
   static const std::vector<Experiment> all{
     { "lines_table", "tables 4.1 and 4.2: line matching by pairs and triplets", true, linesTable },
     { "homing", "chapter 5: homing in simulated rooms, from many starts", false, runHomingExperiment },
+    { "arm", "table 8.1: servoing of a simulated arm, from many starts", false, runArmExperiment },
     { "homing_directions", "the heading between real views of a room", true, runDirectionsExperiment },
     { "multi_hypothesis", "table 9.1, figures 9.1 to 9.6: several hypotheses a point, simulated", false,
       runMultiHypothesisExperiment },

@@ -26,6 +26,8 @@ namespace view_servo
 {
 namespace
 {
+constexpr int BLOCK_RADIUS = 10;  // [px]
+
 /** Levels of half the size each, the image itself first. */
 std::vector<cv::Mat> pyramidOf(const cv::Mat& image, int levels)
 {
@@ -80,6 +82,24 @@ float sample(const cv::Mat& image, float u, float v)
   return above + fv * (below - above);
 }
 
+/** The square about a place of the stored view, seen through a homography; it must lie inside. */
+void warp(const cv::Mat& current, const Eigen::Matrix3d& h, const Eigen::Vector2d& place, int radius,
+          std::vector<float>& values)
+{
+  const Eigen::Vector3f along = h.col(0).cast<float>();
+  std::size_t i = 0;
+  for (int dv = -radius; dv <= radius; ++dv)
+  {
+    Eigen::Vector3f x = (h * Eigen::Vector3d(place.x() - radius, place.y() + dv, 1.0)).cast<float>();
+    for (int du = -radius; du <= radius; ++du, ++i)
+    {
+      const float inverse = 1.0F / x.z();
+      values[i] = sample(current, x.x() * inverse, x.y() * inverse);
+      x += along;
+    }
+  }
+}
+
 /** To zero mean and unit norm. @return the norm there was; 0, and nothing changes, when there is hardly any contrast. */
 float normalize(std::vector<float>& values)
 {
@@ -103,6 +123,72 @@ float normalize(std::vector<float>& values)
     value = (value - mean) / norm;
   }
   return norm;
+}
+
+/** The gradient of values that normalize() has worked on: without its mean and without its part along the values. */
+void normalizeGradient(const std::vector<float>& values, float norm, std::vector<float>& gradient)
+{
+  float average = 0.0F;
+  float along = 0.0F;
+  for (std::size_t i = 0; i < gradient.size(); ++i)
+  {
+    gradient[i] /= norm;
+    average += gradient[i] / static_cast<float>(gradient.size());
+    along += gradient[i] * values[i];
+  }
+  for (std::size_t i = 0; i < gradient.size(); ++i)
+  {
+    gradient[i] -= average + along * values[i];
+  }
+}
+
+using Matrix8 = Eigen::Matrix<double, 8, 8>;
+using Vector8 = Eigen::Matrix<double, 8, 1>;
+
+/** How a homography near the identity, I + [p0 p1 p2; p3 p4 p5; p6 p7 0], shifts a place. */
+Eigen::Matrix<double, 2, 8> shiftByChange(const Eigen::Vector2d& x)
+{
+  Eigen::Matrix<double, 2, 8> jacobian;
+  jacobian << x.x(), x.y(), 1.0, 0.0, 0.0, 0.0, -x.x() * x.x(), -x.x() * x.y(),  //
+      0.0, 0.0, 0.0, x.x(), x.y(), 1.0, -x.x() * x.y(), -x.y() * x.y();
+  return jacobian;
+}
+
+/** I + the change that solves the normal equations, in pixels; empty when they are singular. */
+std::optional<Eigen::Matrix3d> solveChange(const Matrix8& normal, const Vector8& right, const Eigen::Vector2d& middle,
+                                           double spread)
+{
+  const Eigen::LDLT<Matrix8> ldlt(normal);
+  if (ldlt.info() != Eigen::Success || !(ldlt.vectorD().minCoeff() > 0.0))
+  {
+    return std::nullopt;
+  }
+  const Vector8 step = ldlt.solve(right);
+  Eigen::Matrix3d change;
+  change << 1.0 + step(0), step(1), step(2), step(3), 1.0 + step(4), step(5), step(6), step(7), 1.0;
+  Eigen::Matrix3d centring;
+  centring << 1.0 / spread, 0.0, -middle.x() / spread, 0.0, 1.0 / spread, -middle.y() / spread, 0.0, 0.0, 1.0;
+  return Eigen::Matrix3d(centring.inverse() * change * centring);
+}
+
+/** How far a homography moves points, in the mean [px]. */
+double meanWay(const Eigen::Matrix3d& h, const std::vector<Eigen::Vector2d>& points)
+{
+  double sum = 0.0;
+  for (const Eigen::Vector2d& point : points)
+  {
+    sum += (transfer(h, point) - point).norm();
+  }
+  return sum / static_cast<double>(points.size());
+}
+
+/** So that it matters less that interpolation smooths, the more so the further from whole pixels. */
+cv::Mat smoothed(const cv::Mat& image)
+{
+  constexpr double SIGMA = 0.8;  // [px]
+  cv::Mat result;
+  cv::GaussianBlur(image, result, cv::Size(5, 5), SIGMA);
+  return result;
 }
 
 /** RANSAC; empty when too few agree. */
@@ -158,13 +244,10 @@ public:
     {
       return std::nullopt;
     }
-    Eigen::Matrix3d centring;
-    centring << 1.0 / spread, 0.0, -middle.x() / spread, 0.0, 1.0 / spread, -middle.y() / spread, 0.0, 0.0, 1.0;
-    const Eigen::Matrix3d uncentring = centring.inverse();
     for (int round = 0; round < ROUNDS; ++round)
     {
-      Eigen::Matrix<double, 8, 8> normal = Eigen::Matrix<double, 8, 8>::Zero();
-      Eigen::Matrix<double, 8, 1> right = Eigen::Matrix<double, 8, 1>::Zero();
+      Matrix8 normal = Matrix8::Zero();
+      Vector8 right = Vector8::Zero();
       for (const Shift& shift : shifts_)
       {
         const Eigen::Vector2d residual = shift.shift + shift.at - transfer(fitted, shift.at);
@@ -175,22 +258,17 @@ public:
         }
         const double weight = (1.0 - ratio) * (1.0 - ratio);
         const Eigen::Vector2d x = (shift.at - middle) / spread;
-        Eigen::Matrix<double, 2, 8> jacobian;
-        jacobian << x.x(), x.y(), 1.0, 0.0, 0.0, 0.0, -x.x() * x.x(), -x.x() * x.y(),  //
-            0.0, 0.0, 0.0, x.x(), x.y(), 1.0, -x.x() * x.y(), -x.y() * x.y();
+        const Eigen::Matrix<double, 2, 8> jacobian = shiftByChange(x);
         const Eigen::Matrix<double, 8, 2> weighted = weight * jacobian.transpose() * shift.information;
         normal += weighted * jacobian;
         right += weighted * residual / spread;
       }
-      const Eigen::LDLT<Eigen::Matrix<double, 8, 8>> ldlt(normal);
-      if (ldlt.info() != Eigen::Success || !(ldlt.vectorD().minCoeff() > 0.0))
+      const std::optional<Eigen::Matrix3d> change = solveChange(normal, right, middle, spread);
+      if (!change)
       {
         return std::nullopt;
       }
-      const Eigen::Matrix<double, 8, 1> step = ldlt.solve(right);
-      Eigen::Matrix3d change;
-      change << 1.0 + step(0), step(1), step(2), step(3), 1.0 + step(4), step(5), step(6), step(7), 1.0;
-      fitted = uncentring * change * centring * fitted;
+      fitted = *change * fitted;
     }
     return fitted;
   }
@@ -237,6 +315,7 @@ std::vector<std::string> HomographyTrackerParams::validate() const
   faults.require(max_residual > 0.0, "max_residual must be more than 0 px");
   faults.require(min_supporting >= 5, "min_supporting must be at least 5");
   faults.require(min_support > 0.0 && min_support <= 1.0, "min_support must lie in (0, 1]");
+  faults.require(refine_within >= 0.0, "refine_within must not be negative");
   return faults.list();
 }
 
@@ -284,6 +363,142 @@ HomographyTracker::HomographyTracker(const cv::Mat& reference, const cv::Rect& r
     }
     patches_.push_back(std::move(patches));
   }
+  makeBlocks(smoothed(reference), used);
+}
+
+void HomographyTracker::makeBlocks(const cv::Mat& image, const cv::Rect& region)
+{
+  centring_.middle = { region.x + 0.5 * (region.width - 1), region.y + 0.5 * (region.height - 1) };
+  centring_.spread = 0.25 * (region.width + region.height);
+  const cv::Rect inner = region & cv::Rect(1, 1, image.cols - 3, image.rows - 3);  // where there are gradients
+  const int side = 2 * BLOCK_RADIUS + 1;
+  for (int top = inner.y; top + side <= inner.br().y; top += side)
+  {
+    for (int left = inner.x; left + side <= inner.br().x; left += side)
+    {
+      Block block;
+      block.at = { left + BLOCK_RADIUS, top + BLOCK_RADIUS };
+      for (int v = top; v < top + side; ++v)
+      {
+        const unsigned char* row = image.ptr<unsigned char>(v);
+        const unsigned char* above = image.ptr<unsigned char>(v - 1);
+        const unsigned char* below = image.ptr<unsigned char>(v + 1);
+        for (int u = left; u < left + side; ++u)
+        {
+          block.values.push_back(row[u]);
+          block.gradient_u.push_back(0.5F * static_cast<float>(row[u + 1] - row[u - 1]));
+          block.gradient_v.push_back(0.5F * static_cast<float>(below[u] - above[u]));
+        }
+      }
+      block.norm = normalize(block.values);
+      if (!(block.norm > 0.0F))
+      {
+        continue;
+      }
+      normalizeGradient(block.values, block.norm, block.gradient_u);
+      normalizeGradient(block.values, block.norm, block.gradient_v);
+      block.information.setZero();
+      std::size_t i = 0;
+      for (int dv = -BLOCK_RADIUS; dv <= BLOCK_RADIUS; ++dv)
+      {
+        for (int du = -BLOCK_RADIUS; du <= BLOCK_RADIUS; ++du, ++i)
+        {
+          const Eigen::Vector2d x = (block.at + Eigen::Vector2d(du, dv) - centring_.middle) / centring_.spread;
+          const Eigen::RowVector2d gradient(block.gradient_u[i], block.gradient_v[i]);
+          const Eigen::Matrix<double, 1, 8> row = block.norm * centring_.spread * gradient * shiftByChange(x);
+          block.information += row.transpose() * row;
+        }
+      }
+      blocks_.push_back(std::move(block));
+    }
+  }
+}
+
+Eigen::Matrix3d HomographyTracker::refine(const cv::Mat& current, const Eigen::Matrix3d& h) const
+{
+  constexpr int ITERATIONS = 2;
+  constexpr double WIDTH = 3.0;       // of the weights, in median deviations
+  constexpr std::size_t FEWEST = 12;  // blocks
+  struct Seen
+  {
+    const Block* block;
+    double deviation;  // of its pixels [grey levels]
+    Vector8 right;
+  };
+  Eigen::Matrix3d refined = h;
+  std::vector<float> values(static_cast<std::size_t>((2 * BLOCK_RADIUS + 1) * (2 * BLOCK_RADIUS + 1)));
+  for (int iteration = 0; iteration < ITERATIONS; ++iteration)
+  {
+    std::vector<Seen> all;
+    std::vector<double> deviations;
+    for (const Block& block : blocks_)
+    {
+      if (!isInside(refined, block.at, BLOCK_RADIUS, current.size()))
+      {
+        continue;
+      }
+      warp(current, refined, block.at, BLOCK_RADIUS, values);
+      if (!(normalize(values) > 0.0F))
+      {
+        continue;
+      }
+      // Sums of the gradients times the differences, times 1, x, y, and of both along the way from the middle.
+      float squares = 0.0F;
+      Eigen::Matrix<float, 8, 1> right = Eigen::Matrix<float, 8, 1>::Zero();
+      std::size_t i = 0;
+      for (int dv = -BLOCK_RADIUS; dv <= BLOCK_RADIUS; ++dv)
+      {
+        const float y = static_cast<float>((block.at.y() + dv - centring_.middle.y()) / centring_.spread);
+        for (int du = -BLOCK_RADIUS; du <= BLOCK_RADIUS; ++du, ++i)
+        {
+          const float x = static_cast<float>((block.at.x() + du - centring_.middle.x()) / centring_.spread);
+          const float difference = values[i] - block.values[i];
+          const float along_u = difference * block.gradient_u[i];
+          const float along_v = difference * block.gradient_v[i];
+          const float outward = -(x * along_u + y * along_v);
+          squares += difference * difference;
+          right(0) += x * along_u;
+          right(1) += y * along_u;
+          right(2) += along_u;
+          right(3) += x * along_v;
+          right(4) += y * along_v;
+          right(5) += along_v;
+          right(6) += x * outward;
+          right(7) += y * outward;
+        }
+      }
+      if (!(1.0F - 0.5F * squares >= static_cast<float>(params_.min_correlation)))
+      {
+        continue;
+      }
+      const double scale = static_cast<double>(block.norm) * static_cast<double>(block.norm) * centring_.spread;
+      const double deviation = block.norm * std::sqrt(squares / static_cast<float>(values.size()));
+      all.push_back({ &block, deviation, scale * right.cast<double>() });
+      deviations.push_back(deviation);
+    }
+    if (all.size() < FEWEST)
+    {
+      return refined;
+    }
+    const auto middle = deviations.begin() + static_cast<std::ptrdiff_t>(deviations.size() / 2);
+    std::nth_element(deviations.begin(), middle, deviations.end());
+    Matrix8 normal = Matrix8::Zero();
+    Vector8 right = Vector8::Zero();
+    for (const Seen& seen : all)
+    {
+      const double ratio = seen.deviation / (WIDTH * std::max(*middle, 1e-3));
+      const double weight = ratio < 1.0 ? (1.0 - ratio * ratio) * (1.0 - ratio * ratio) : 0.0;
+      normal += weight * seen.block->information;
+      right += weight * seen.right;
+    }
+    const std::optional<Eigen::Matrix3d> left = solveChange(normal, right, centring_.middle, centring_.spread);
+    if (!left)
+    {
+      return refined;
+    }
+    refined = refined * left->inverse();
+  }
+  return refined;
 }
 
 HomographyTracker::Patch HomographyTracker::makePatch(const cv::Mat& image, const Eigen::Vector2d& at, int radius)
@@ -308,28 +523,13 @@ HomographyTracker::Patch HomographyTracker::makePatch(const cv::Mat& image, cons
       gradient_v.push_back(0.5F * (sample(image, u, v + 1.0F) - sample(image, u, v - 1.0F)));
     }
   }
-  // The normalised values change by the gradient without its mean and without its part along the values.
   const float norm = normalize(patch.values);
   if (!(norm > 0.0F))
   {
     return patch;
   }
-  const auto tangent = [&](std::vector<float>& gradient) {
-    float average = 0.0F;
-    float along = 0.0F;
-    for (std::size_t i = 0; i < gradient.size(); ++i)
-    {
-      gradient[i] /= norm;
-      average += gradient[i] / static_cast<float>(gradient.size());
-      along += gradient[i] * patch.values[i];
-    }
-    for (std::size_t i = 0; i < gradient.size(); ++i)
-    {
-      gradient[i] -= average + along * patch.values[i];
-    }
-  };
-  tangent(gradient_u);
-  tangent(gradient_v);
+  normalizeGradient(patch.values, norm, gradient_u);
+  normalizeGradient(patch.values, norm, gradient_v);
   Eigen::Matrix2d hessian = Eigen::Matrix2d::Zero();
   for (std::size_t i = 0; i < gradient_u.size(); ++i)
   {
@@ -342,7 +542,7 @@ HomographyTracker::Patch HomographyTracker::makePatch(const cv::Mat& image, cons
   {
     return patch;
   }
-  patch.information = hessian;
+  patch.information = norm * norm * hessian;
   const Eigen::Matrix2d inverse = hessian.inverse();
   for (std::size_t i = 0; i < gradient_u.size(); ++i)
   {
@@ -360,7 +560,6 @@ bool HomographyTracker::align(const cv::Mat& current, const Patch& patch, const 
   constexpr double CONVERGED = 0.005;  // step [px of the stored view]
   constexpr double LARGEST = 1.5;      // way, in radii
   const int radius = patch.radius;
-  const Eigen::Vector3f along = h.col(0).cast<float>();
   alignment.shift.setZero();
   std::vector<float> values(patch.values.size());
   for (int iteration = 0;; ++iteration)
@@ -371,17 +570,7 @@ bool HomographyTracker::align(const cv::Mat& current, const Patch& patch, const 
     {
       return false;
     }
-    std::size_t i = 0;
-    for (int dv = -radius; dv <= radius; ++dv)
-    {
-      Eigen::Vector3f x = (h * Eigen::Vector3d(place.x() - radius, place.y() + dv, 1.0)).cast<float>();
-      for (int du = -radius; du <= radius; ++du, ++i)
-      {
-        const float inverse = 1.0F / x.z();
-        values[i] = sample(current, x.x() * inverse, x.y() * inverse);
-        x += along;
-      }
-    }
+    warp(current, h, place, radius, values);
     if (!(normalize(values) > 0.0F))
     {
       return false;
@@ -389,7 +578,7 @@ bool HomographyTracker::align(const cv::Mat& current, const Patch& patch, const 
     float shift_u = 0.0F;
     float shift_v = 0.0F;
     float dot = 0.0F;
-    for (i = 0; i < values.size(); ++i)
+    for (std::size_t i = 0; i < values.size(); ++i)
     {
       const float difference = values[i] - patch.values[i];
       shift_u += patch.descent_u[i] * difference;
@@ -456,6 +645,10 @@ TrackedHomography HomographyTracker::track(const cv::Mat& current, const Eigen::
     {
       result = other;
     }
+  }
+  if (result.found && meanWay(result.h, points_) < params_.refine_within)
+  {
+    result.h = normalizedHomography(refine(smoothed(current), result.h));
   }
   return result;
 }

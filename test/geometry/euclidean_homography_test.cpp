@@ -97,4 +97,61 @@ TEST(DecomposeHomography, NoneForWhatCanNotBeSeen)
   EXPECT_TRUE(decomposeHomography(scene.k * mirror * scene.k.inverse() * scene.homography, scene.k, seen).empty());
 }
 
+TEST(MotionBefore, IsThatOfTheSceneHoweverShort)
+{
+  Rng rng(4);
+  for (int trial = 0; trial < 100; ++trial)
+  {
+    test::SceneOptions options;
+    options.planar = true;
+    options.inliers = 10;
+    const test::Scene scene = test::makeScene(options, rng);
+    const double part = trial % 2 == 0 ? 1.0 : 1e-6;  // of the way
+    const EuclideanHomography truth{ scene.r, part * scene.t / scene.d, scene.n };
+    const Eigen::Matrix3d h = uniform(rng, -5.0, -0.1) * (scene.k * truth.matrix() * scene.k.inverse());
+    const Eigen::Matrix3d calibrated = calibratedHomography(h, scene.k, referencePoints(scene));
+    EXPECT_LT((calibrated - truth.matrix()).norm(), 1e-9);
+    const EuclideanHomography found = motionBefore(calibrated, scene.n);
+    EXPECT_LT(angleBetween(found.rotation, scene.r), 1e-7) << trial;
+    EXPECT_LT((found.translation_over_distance - truth.translation_over_distance).norm(), 1e-8) << trial;
+  }
+}
+
+TEST(MovedOn, ComposesMotions)
+{
+  Rng rng(5);
+  const Eigen::Vector3d normal = test::randomRotation(rng, 0.4) * Eigen::Vector3d::UnitZ();
+  const double distance = 0.7;
+  Eigen::Isometry3d first = Eigen::Isometry3d::Identity();
+  first.linear() = test::randomRotation(rng, 0.5);
+  first.translation() = Eigen::Vector3d(0.1, -0.2, 0.05);
+  Eigen::Isometry3d second = Eigen::Isometry3d::Identity();
+  second.linear() = test::randomRotation(rng, 0.5);
+  second.translation() = Eigen::Vector3d(-0.3, 0.1, 0.15);
+  const EuclideanHomography before{ first.linear(), first.translation() / distance, normal };
+  const EuclideanHomography after = movedOn(before, second, distance);
+  const Eigen::Isometry3d both = second * first;
+  EXPECT_LT((after.rotation - both.linear()).norm(), 1e-12);
+  EXPECT_LT((distance * after.translation_over_distance - both.translation()).norm(), 1e-12);
+  EXPECT_EQ(after.normal, normal);
+  // Without a distance the turn alone counts.
+  const EuclideanHomography turned = movedOn(before, second, std::numeric_limits<double>::infinity());
+  EXPECT_LT((turned.rotation - both.linear()).norm(), 1e-12);
+  EXPECT_LT((turned.translation_over_distance - second.linear() * before.translation_over_distance).norm(), 1e-12);
+}
+
+TEST(NearestRotation, MendsWhatIsNearlyOne)
+{
+  Rng rng(6);
+  for (int trial = 0; trial < 50; ++trial)
+  {
+    const Eigen::Matrix3d rotation = test::randomRotation(rng, 3.0);
+    EXPECT_LT((nearestRotation(3.0 * rotation) - rotation).norm(), 1e-9);
+    // Two of its directions are enough.
+    const Eigen::Vector3d without = test::randomRotation(rng, 3.0) * Eigen::Vector3d::UnitX();
+    const Eigen::Matrix3d along = rotation * (Eigen::Matrix3d::Identity() - without * without.transpose());
+    EXPECT_LT((nearestRotation(along) - rotation).norm(), 1e-9);
+  }
+}
+
 }  // namespace view_servo

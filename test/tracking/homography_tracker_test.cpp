@@ -2,7 +2,10 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "view_servo/tracking/homography_tracker.h"
 
+#include "sim/renderer.h"
+#include "sim/world.h"
 #include "support/textured_plane.h"
+#include "view_servo/geometry/homography.h"
 
 #include <gtest/gtest.h>
 #include <Eigen/Geometry>
@@ -10,6 +13,7 @@
 #include <opencv2/core.hpp>
 #include <opencv2/imgproc.hpp>
 
+#include <algorithm>
 #include <cmath>
 #include <limits>
 #include <stdexcept>
@@ -94,7 +98,8 @@ TEST(HomographyTrackerParams, NameAllFaultsAtOnce)
   params.max_residual = 0.0;
   params.min_supporting = 4;
   params.min_support = std::numeric_limits<double>::quiet_NaN();
-  EXPECT_EQ(params.validate().size(), 7U);
+  params.refine_within = -1.0;
+  EXPECT_EQ(params.validate().size(), 8U);
 }
 
 TEST(HomographyTracker, RefusesWhatItCanNotTrack)
@@ -187,6 +192,59 @@ TEST(HomographyTracker, IsNotMisledByWhatCoversAPart)
     ASSERT_TRUE(result.found) << left;
     EXPECT_LT(test::cornerError(result.h, truth, SIZE), 0.4) << left;
     EXPECT_LT(result.supporting, 0.8 * result.looked_for) << left;
+  }
+}
+
+/** Where the views nearly agree, all pixels tell more than the corners, whatever the light and what is hidden. */
+TEST(HomographyTracker, AllPixelsHaveTheLastWord)
+{
+  constexpr int PLACES = 8;
+  constexpr double DISTANCE = 0.46;  // of the printed face from the world's goal [m]
+  sim::World world = sim::readWorld(std::string(WORLDS_DIR) + "/rice.yaml");
+  world.quality.noise = 2.0;
+  sim::SimulatedCamera camera(world, {}, 1);
+  const cv::Mat reference = camera.capture(world.goal);
+  camera.setLight({ 0.7, 15.0, 0.4 });
+  HomographyTrackerParams unrefined;
+  unrefined.refine_within = 0.0;
+  const HomographyTracker all_pixels(reference, world.region, HomographyTrackerParams());
+  const HomographyTracker corners(reference, world.region, unrefined);
+  const auto error = [&world](const Eigen::Matrix3d& h, const Eigen::Matrix3d& truth) {
+    double worst = 0.0;
+    for (const cv::Point& corner : { world.region.tl(), world.region.br() })
+    {
+      worst = std::max(worst, (transfer(h, { corner.x, corner.y }) - transfer(truth, { corner.x, corner.y })).norm());
+    }
+    return worst;
+  };
+  for (const bool hidden : { false, true })
+  {
+    double with = 0.0;
+    double without = 0.0;
+    for (int i = 0; i < PLACES; ++i)
+    {
+      Eigen::Isometry3d off = Eigen::Isometry3d::Identity();
+      off.translation() = 4e-4 * Eigen::Vector3d(std::cos(i), std::sin(i), 0.5);
+      off.linear() =
+          Eigen::AngleAxisd(1e-3, Eigen::Vector3d(std::sin(2 * i), 0.6, 0.5).normalized()).toRotationMatrix();
+      const Eigen::Isometry3d motion = off.inverse();
+      const Eigen::Matrix3d truth = world.camera.k *
+                                    (motion.linear() + motion.translation() / DISTANCE * Eigen::RowVector3d::UnitZ()) *
+                                    world.camera.k.inverse();
+      cv::Mat image = camera.capture(world.goal * off);
+      if (hidden)
+      {
+        const cv::Rect part(200, 40, 120, 240);
+        test::texturedPicture(50, part.size()).copyTo(image(part));
+      }
+      const TrackedHomography refined = all_pixels.track(image, Eigen::Matrix3d::Identity());
+      const TrackedHomography plain = corners.track(image, Eigen::Matrix3d::Identity());
+      ASSERT_TRUE(refined.found && plain.found) << i;
+      with += error(refined.h, truth) / PLACES;
+      without += error(plain.h, truth) / PLACES;
+    }
+    EXPECT_LT(with, 0.75 * without) << hidden;
+    EXPECT_LT(with, 0.1) << hidden;
   }
 }
 

@@ -54,7 +54,7 @@ struct Servo25dError
 {
   Eigen::Vector2d point;     ///< (x - x*, y - y*) of the chosen point, in normalised coordinates
   double depth = 0.0;        ///< log(Z / Z*) of the chosen point
-  Eigen::Vector3d rotation;  ///< θu of the turn that is still to go, in the current camera frame [rad]
+  Eigen::Vector3d rotation;  ///< θu by which the camera is turned from where it was stored [rad]
 };
 
 /** @param point the chosen point (x*, y*) of the stored view, in normalised coordinates. */
@@ -107,7 +107,7 @@ public:
   Servo25d(const ServoTarget& target, const Servo25dParams& params);
   ~Servo25d();
 
-  /** An image in which the plane was found. */
+  /** An image in which the plane was found. Numbers that are not finite are a loss; an older image than the last is none. */
   void add(const PlaneView& view);
 
   /** An image in which it was not. @param stamp of the image [s]. @param reason what there is to say of it. */

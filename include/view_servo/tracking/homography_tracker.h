@@ -21,6 +21,7 @@ struct HomographyTrackerParams
   double max_residual = 2.0;     ///< of a point that supports the homography [px], > 0
   int min_supporting = 15;       ///< points that make a homography, >= 5
   double min_support = 0.25;     ///< part of the points in sight that makes one, (0, 1]
+  double refine_within = 20.0;  ///< mean way of the points from the stored view below which all pixels count [px], >= 0
 
   /** All faults, one a line; empty when the parameters are usable. */
   std::vector<std::string> validate() const;
@@ -43,7 +44,8 @@ struct TrackedHomography
  * both are normalised to zero mean and unit norm, so that gain and offset of the light do not matter. As in the thesis no
  * point is followed from image to image: each is found anew or not, and RANSAC on the coarsest level and robust fits below
  * it, which weigh each patch by what its texture tells, decide which are believed. Hidden patches correlate too little and
- * drop out.
+ * drop out. Where the views nearly agree, all pixels of the region have the last word, in blocks, of which those that differ
+ * more than the others count less.
  *
  * Stateless but for what it knows of the stored view; the caller predicts, from odometry or from the motion before.
  */
@@ -71,12 +73,30 @@ public:
   }
 
 private:
+  /** Coordinates about the middle of some points and of the order of 1: x = (pixel - middle) / spread. */
+  struct Centring
+  {
+    Eigen::Vector2d middle = Eigen::Vector2d::Zero();  // [px]
+    double spread = 1.0;                               // [px]
+  };
+
+  /** A part of the stored view that is all of one light, and what its alignment needs. */
+  struct Block
+  {
+    Eigen::Vector2d at;             // its middle
+    float norm = 0.0F;              // of its grey values without their mean
+    std::vector<float> values;      // zero mean, unit norm
+    std::vector<float> gradient_u;  // of these
+    std::vector<float> gradient_v;
+    Eigen::Matrix<double, 8, 8> information;  // of a homography near the identity, for grey values
+  };
+
   /** A patch of one level, normalised, with what its alignment needs. */
   struct Patch
   {
     bool usable = false;
     int radius = 0;
-    Eigen::Matrix2d information;   // of its position [1/px²], for values of norm 1
+    Eigen::Matrix2d information;   // of its position, for grey values
     std::vector<float> values;     // zero mean, unit norm
     std::vector<float> descent_u;  // inverse information times the gradient of the normalised values
     std::vector<float> descent_v;
@@ -100,10 +120,14 @@ private:
   static bool align(const cv::Mat& current, const Patch& patch, const Eigen::Matrix3d& h, int iterations,
                     Alignment& alignment);
   static Patch makePatch(const cv::Mat& image, const Eigen::Vector2d& at, int radius);
+  void makeBlocks(const cv::Mat& image, const cv::Rect& region);
+  Eigen::Matrix3d refine(const cv::Mat& current, const Eigen::Matrix3d& h) const;
 
   HomographyTrackerParams params_;
   std::vector<Eigen::Vector2d> points_;      // pixels of the full image
   std::vector<std::vector<Patch>> patches_;  // of levels, of points
+  std::vector<Block> blocks_;                // side by side over the region
+  Centring centring_;
 };
 
 }  // namespace view_servo

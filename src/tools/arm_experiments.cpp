@@ -1,0 +1,212 @@
+// Copyright (c) 2026, the view_servo authors
+// SPDX-License-Identifier: BSD-3-Clause
+#include "arm_experiments.h"
+
+#include "package_folder.h"
+#include "parallel.h"
+#include "sim/arm_trial.h"
+#include "sim/world.h"
+#include "view_servo/robust/random.h"
+
+#include <Eigen/Geometry>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstdint>
+#include <cstdio>
+#include <fstream>
+#include <iostream>
+#include <iterator>
+#include <map>
+#include <mutex>
+#include <numeric>
+#include <sstream>
+#include <stdexcept>
+#include <string>
+#include <vector>
+
+namespace view_servo
+{
+namespace
+{
+constexpr double DEGREES = 180.0 / M_PI;
+constexpr std::array<const char*, 2> WORLDS = { "rice", "mouse" };
+constexpr std::array<const char*, 3> STARTS = { "near", "far", "extreme" };
+
+/** One run of servoing. */
+struct Run
+{
+  std::string world;
+  std::string start;
+  int index;  ///< of the runs from this start
+  bool other_light;
+};
+
+/** What a table's row sums up. */
+struct Row
+{
+  int runs = 0;
+  int failures = 0;
+  int wrong = 0;  ///< converged, it says, and is not
+  std::vector<double> millimetres;
+  std::vector<double> degrees;
+};
+
+std::uint64_t seedOf(const Run& run)
+{
+  return static_cast<std::uint64_t>(run.index) + 1;
+}
+
+sim::ArmTrialParams paramsOf(const Run& run, const sim::World& world)
+{
+  Rng rng(seedOf(run));
+  sim::ArmTrialParams params;
+  params.seed = seedOf(run);
+  params.conditions.image_noise = 2.0;
+  params.conditions.encoder_noise = 1e-4;
+  params.conditions.hand_eye_translation_error = 0.002;
+  params.conditions.hand_eye_rotation_error = 0.5 / DEGREES;
+  params.conditions.focal_length_error = 0.005;
+  params.conditions.light = world.light;
+  if (run.other_light)
+  {
+    params.conditions.light.gain = uniform(rng, 0.6, 1.3);
+    params.conditions.light.offset = uniform(rng, -20.0, 20.0);
+    params.conditions.light.gradient = uniform(rng, -0.5, 0.5);
+  }
+  if (run.start == STARTS.back())
+  {
+    params.conditions.groups = { "distractors" };
+  }
+  return params;
+}
+
+/** A few millimetres and degrees beside a world's start: no two runs are the same. */
+Eigen::Isometry3d startOf(const Run& run, const sim::World& world)
+{
+  constexpr double LENGTH = 0.01;               // [m]
+  constexpr double ANGLE = 1.5 * M_PI / 180.0;  // [rad]
+  Rng rng(1000 + seedOf(run));
+  const auto vector = [&rng](double size) {
+    const double x = uniform(rng, -size, size);
+    const double y = uniform(rng, -size, size);
+    return Eigen::Vector3d(x, y, uniform(rng, -size, size));
+  };
+  const Eigen::Vector3d turn = vector(ANGLE);
+  return world.start(run.start) * Eigen::Translation3d(vector(LENGTH)) *
+         Eigen::AngleAxisd(turn.norm(), turn.normalized());
+}
+
+double mean(const std::vector<double>& values)
+{
+  return std::accumulate(values.begin(), values.end(), 0.0) / static_cast<double>(values.size());
+}
+
+double deviation(const std::vector<double>& values)
+{
+  double squares = 0.0;
+  for (const double value : values)
+  {
+    squares += (value - mean(values)) * (value - mean(values));
+  }
+  return std::sqrt(squares / static_cast<double>(values.size()));
+}
+
+std::string readText(const std::filesystem::path& file)
+{
+  std::ifstream stream(file);
+  if (!stream)
+  {
+    throw std::runtime_error("cannot read " + file.string());
+  }
+  return { std::istreambuf_iterator<char>(stream), std::istreambuf_iterator<char>() };
+}
+
+}  // namespace
+
+void runArmExperiment(const ExperimentContext& context, std::ostream& csv)
+{
+  constexpr double NEAR_ENOUGH = 0.005;              // [m]: what says converged and is further off is wrong
+  constexpr double STRAIGHT_ENOUGH = 0.5 / DEGREES;  // [rad]
+  const int runs_each = context.brief ? 2 : 20;
+  const std::string urdf = readText(packageFolder() / "urdf" / "puma560.urdf");
+  std::map<std::string, sim::World> worlds;
+  std::vector<Run> runs;
+  for (const char* world : WORLDS)
+  {
+    worlds.emplace(world, sim::findWorld(world, packageFolder() / "config" / "worlds"));
+    for (const char* start : STARTS)
+    {
+      for (int i = 0; i < runs_each; ++i)
+      {
+        runs.push_back({ world, start, i, i % 2 == 1 });
+      }
+    }
+  }
+
+  std::vector<std::string> lines(runs.size());
+  std::map<std::string, Row> table;
+  std::mutex mutex;
+  std::size_t done = 0;
+  inParallel(runs.size(), context.threads, [&](std::size_t i) {
+    const Run& run = runs[i];
+    const sim::World& world = worlds.at(run.world);
+    const Eigen::Isometry3d start = startOf(run, world);
+    const Eigen::Isometry3d way = world.goal.inverse() * start;
+    sim::ArmTrials trials(world, urdf, paramsOf(run, world));
+    double least_margin = world.camera.width;  // of the chosen point from the image's border [px]
+    const sim::ArmOutcome outcome = trials.run(start, [&](const sim::ArmStep& step) {
+      const Eigen::Vector2d& point = step.report.point;
+      if (point.allFinite())
+      {
+        least_margin = std::min({ least_margin, point.x(), point.y(), world.camera.width - 1.0 - point.x(),
+                                  world.camera.height - 1.0 - point.y() });
+      }
+    });
+    std::string reason = outcome.reason;
+    std::replace(reason.begin(), reason.end(), ',', ';');
+    std::ostringstream line;
+    line << run.world << ',' << run.start << ',' << run.index << ',' << (run.other_light ? "other" : "same") << ','
+         << 1e3 * way.translation().norm() << ',' << DEGREES * Eigen::AngleAxisd(way.linear()).angle() << ','
+         << (outcome.converged ? 1 : 0) << ',' << 1e3 * outcome.translation_error << ','
+         << DEGREES * outcome.rotation_error << ',' << outcome.duration << ',' << least_margin << ',' << reason << '\n';
+    const std::lock_guard<std::mutex> lock(mutex);
+    lines[i] = line.str();
+    std::cerr << ++done << " of " << runs.size() << ": " << lines[i] << std::flush;
+    Row& row = table[run.world + " " + run.start];
+    ++row.runs;
+    if (!outcome.converged)
+    {
+      ++row.failures;
+      return;
+    }
+    row.wrong += outcome.translation_error > NEAR_ENOUGH || outcome.rotation_error > STRAIGHT_ENOUGH ? 1 : 0;
+    row.millimetres.push_back(1e3 * outcome.translation_error);
+    row.degrees.push_back(DEGREES * outcome.rotation_error);
+  });
+
+  csv << "world,start,index,light,start_distance_mm,start_turn_deg,converged,translation_error_mm,rotation_error_deg,"
+         "duration_s,least_margin_px,reason\n";
+  for (const std::string& line : lines)
+  {
+    csv << line;
+  }
+  std::printf("%-14s %8s %6s %9s %6s %9s %6s\n", "", "failures", "wrong", "pos [mm]", "std", "ang [deg]", "std");
+  for (const char* world : WORLDS)
+  {
+    for (const char* start : STARTS)
+    {
+      const Row& row = table[std::string(world) + " " + start];
+      if (row.millimetres.empty())
+      {
+        std::printf("%-6s %-7s %2d of %2d\n", world, start, row.failures, row.runs);
+        continue;
+      }
+      std::printf("%-6s %-7s %2d of %2d %6d %9.2f %6.2f %9.3f %6.3f\n", world, start, row.failures, row.runs, row.wrong,
+                  mean(row.millimetres), deviation(row.millimetres), mean(row.degrees), deviation(row.degrees));
+    }
+  }
+}
+
+}  // namespace view_servo
