@@ -2,6 +2,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "arm_experiments.h"
 
+#include "input_file.h"
 #include "package_folder.h"
 #include "parallel.h"
 #include "sim/arm_trial.h"
@@ -22,7 +23,6 @@
 #include <mutex>
 #include <numeric>
 #include <sstream>
-#include <stdexcept>
 #include <string>
 #include <vector>
 
@@ -113,16 +113,6 @@ double deviation(const std::vector<double>& values)
   return std::sqrt(squares / static_cast<double>(values.size()));
 }
 
-std::string readText(const std::filesystem::path& file)
-{
-  std::ifstream stream(file);
-  if (!stream)
-  {
-    throw std::runtime_error("cannot read " + file.string());
-  }
-  return { std::istreambuf_iterator<char>(stream), std::istreambuf_iterator<char>() };
-}
-
 }  // namespace
 
 void runArmExperiment(const ExperimentContext& context, std::ostream& csv)
@@ -130,7 +120,8 @@ void runArmExperiment(const ExperimentContext& context, std::ostream& csv)
   constexpr double NEAR_ENOUGH = 0.005;              // [m]: what says converged and is further off is wrong
   constexpr double STRAIGHT_ENOUGH = 0.5 / DEGREES;  // [rad]
   const int runs_each = context.brief ? 2 : 20;
-  const std::string urdf = readText(packageFolder() / "urdf" / "puma560.urdf");
+  std::ifstream urdf_file = openForReading(packageFolder() / "urdf" / "puma560.urdf");
+  const std::string urdf{ std::istreambuf_iterator<char>(urdf_file), std::istreambuf_iterator<char>() };
   std::map<std::string, sim::World> worlds;
   std::vector<Run> runs;
   for (const char* world : WORLDS)

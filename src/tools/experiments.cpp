@@ -6,6 +6,7 @@
  * beside it, drawn by plot_experiment; `--list` names them. Those that need real images read them from VIEW_SERVO_DATA.
  */
 #include "arm_experiments.h"
+#include "arm_geometry_experiment.h"
 #include "cyclic_order_experiment.h"
 #include "homing_experiments.h"
 #include "hypothesis_experiments.h"
@@ -185,6 +186,7 @@ const std::vector<Experiment>& experiments()
       runProfileParametersExperiment },
     { "view_consistency", "tables 6.2 and 6.3: the view constraint before and within RANSAC", true,
       runViewConsistencyExperiment },
+    { "arm_geometry", "chapter 8: motions from homographies beside a real arm's", true, runArmGeometryExperiment },
     { "cyclic_order", "figures 7.5 to 7.11: cyclic order against plain votes", false, runCyclicOrderExperiment },
   };
   return all;

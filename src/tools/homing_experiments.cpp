@@ -2,6 +2,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "homing_experiments.h"
 
+#include "input_file.h"
 #include "package_folder.h"
 #include "parallel.h"
 #include "sim/homing_trial.h"
@@ -26,7 +27,6 @@
 #include <memory>
 #include <mutex>
 #include <sstream>
-#include <stdexcept>
 #include <string>
 #include <vector>
 
@@ -169,16 +169,6 @@ struct IndoorWalk
   };
   std::vector<Pair> pairs;  ///< each in both directions
 };
-
-std::ifstream openForReading(const fs::path& file)
-{
-  std::ifstream stream(file);
-  if (!stream)
-  {
-    throw std::runtime_error("cannot read " + file.string());
-  }
-  return stream;
-}
 
 IndoorWalk readIndoorWalk(const fs::path& folder)
 {

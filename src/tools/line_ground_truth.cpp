@@ -2,6 +2,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "line_ground_truth.h"
 
+#include "input_file.h"
 #include "view_servo/views/image_io.h"
 #include "view_servo/views/segment_io.h"
 
@@ -35,16 +36,6 @@ std::vector<fs::path> filesLike(const fs::path& folder, const std::string& patte
   return files;
 }
 
-std::ifstream open(const fs::path& file)
-{
-  std::ifstream stream(file);
-  if (!stream)
-  {
-    throw std::runtime_error("cannot read " + file.string());
-  }
-  return stream;
-}
-
 std::vector<int> indices(std::string list)
 {
   std::replace(list.begin(), list.end(), ',', ' ');
@@ -71,7 +62,7 @@ LinePair readBenchmarkPair(const fs::path& folder)
   pair.current = readGreyImage(images[1].string());
   pair.reference_segments = readSegments(segments[0].string());
   pair.current_segments = readSegments(segments[1].string());
-  std::ifstream truth = open(folder / "lsd_GroundTruthMatches.txt");
+  std::ifstream truth = openForReading(folder / "lsd_GroundTruthMatches.txt");
   const std::regex groups("\\(([0-9,]*)\\)\\s*\\(([0-9,]*)\\)\\s*");
   std::smatch found;
   for (std::string line; std::getline(truth, line);)
@@ -140,7 +131,7 @@ LinePair readMertonPair(const fs::path& data, int reference_view, int current_vi
   pair.current = readGreyImage((folder / "images" / (name(current_view) + ".jpg")).string());
   pair.reference_segments = readSegments((folder / "2D" / (name(reference_view) + ".lines")).string());
   pair.current_segments = readSegments((folder / "2D" / (name(current_view) + ".lines")).string());
-  std::ifstream truth = open(folder / "2D" / "nview-lines");
+  std::ifstream truth = openForReading(folder / "2D" / "nview-lines");
   for (int of[3]; truth >> of[0] >> of[1] >> of[2];)
   {
     pair.truth.push_back({ { of[reference_view - 1] }, { of[current_view - 1] } });

@@ -2,6 +2,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "point_pairs.h"
 
+#include "input_file.h"
 #include "view_servo/geometry/fundamental.h"
 #include "view_servo/geometry/homography.h"
 #include "view_servo/views/image_io.h"
@@ -25,16 +26,6 @@ namespace
 namespace fs = std::filesystem;
 
 constexpr double CORRECT = 4.0;  // [px]
-
-std::ifstream open(const fs::path& file)
-{
-  std::ifstream stream(file);
-  if (!stream)
-  {
-    throw std::runtime_error("cannot read " + file.string());
-  }
-  return stream;
-}
 
 /** The file of that name with one of the endings images have. */
 fs::path imageFile(const fs::path& stem)
@@ -118,7 +109,7 @@ PointPair readOxfordPair(const fs::path& data, const std::string& sequence, int 
   pair.current = readGreyImage(imageFile(folder / ("img" + std::to_string(number))).string());
   pair.model = GeometryModel::HOMOGRAPHY;
   const fs::path truth_file = folder / ("H1to" + std::to_string(number) + "p");
-  std::ifstream stream = open(truth_file);
+  std::ifstream stream = openForReading(truth_file);
   Eigen::Matrix3d h;
   for (int i = 0; i < 9; ++i)
   {
@@ -146,7 +137,7 @@ PointPair readKusvodPair(const fs::path& data, const std::string& name)
   pair.name = name;
   pair.reference = readGreyImage(imageFile(folder / (name + "A")).string());
   pair.current = readGreyImage(imageFile(folder / (name + "B")).string());
-  std::ifstream stream = open(folder / (name + "_vpts.txt"));
+  std::ifstream stream = openForReading(folder / (name + "_vpts.txt"));
   Correspondence point;
   while (stream >> point.reference.x() >> point.reference.y() >> point.current.x() >> point.current.y())
   {
@@ -163,7 +154,7 @@ PointPair readMertonPoints(const fs::path& data, int reference_view, int current
     return "00" + std::to_string(view);
   };
   const auto corners_of = [&](int view) {
-    std::ifstream stream = open(folder / "2D" / (name(view) + ".corners"));
+    std::ifstream stream = openForReading(folder / "2D" / (name(view) + ".corners"));
     Points corners;
     for (Eigen::Vector2d corner; stream >> corner.x() >> corner.y();)
     {
@@ -177,7 +168,7 @@ PointPair readMertonPoints(const fs::path& data, int reference_view, int current
   pair.current = readGreyImage(imageFile(folder / "images" / name(current_view)).string());
   const Points reference = corners_of(reference_view);
   const Points current = corners_of(current_view);
-  std::ifstream tracks = open(folder / "2D" / "nview-corners");
+  std::ifstream tracks = openForReading(folder / "2D" / "nview-corners");
   for (std::string of[3]; tracks >> of[0] >> of[1] >> of[2];)
   {
     const std::string& from = of[reference_view - 1];
@@ -198,7 +189,7 @@ std::vector<PointPair> readAdelaidePairs(const fs::path& data, GeometryModel mod
   const bool planes = model == GeometryModel::HOMOGRAPHY;
   const fs::path folder = data / "adelaidermf" / (planes ? "homography" : "fundamental");
   const fs::path points_file = folder / (name + "_pts.txt");
-  std::ifstream stream = open(points_file);
+  std::ifstream stream = openForReading(points_file);
   std::map<int, Correspondences> structures;
   Correspondence point;
   double one = 0.0;

@@ -536,13 +536,16 @@ HomographyTracker::Patch HomographyTracker::makePatch(const cv::Mat& image, cons
     const Eigen::Vector2d gradient(gradient_u[i], gradient_v[i]);
     hessian += gradient * gradient.transpose();
   }
-  constexpr double LEAST_RATIO = 0.02;  // of the Hessian's eigenvalues: less is an edge, which tells one direction
+  constexpr double NOISE = 3.0;           // of a pixel [grey levels]
+  constexpr double DISSIMILARITY = 0.02;  // of a pixel, of the norm of a patch
+  constexpr double LEAST_RATIO = 0.02;    // of the Hessian's eigenvalues: less is an edge, which tells one direction
   const double trace = hessian.trace();
   if (!(hessian.determinant() > LEAST_RATIO * trace * trace / 4.0))
   {
     return patch;
   }
-  patch.information = norm * norm * hessian;
+  // Values are off by noise, and by as large a part of their contrast as they are not sampled or seen alike.
+  patch.information = hessian / (NOISE * NOISE / (norm * norm) + DISSIMILARITY * DISSIMILARITY);
   const Eigen::Matrix2d inverse = hessian.inverse();
   for (std::size_t i = 0; i < gradient_u.size(); ++i)
   {

@@ -96,7 +96,7 @@ private:
   {
     bool usable = false;
     int radius = 0;
-    Eigen::Matrix2d information;   // of its position, for grey values
+    Eigen::Matrix2d information;   // of its position [1/px²]
     std::vector<float> values;     // zero mean, unit norm
     std::vector<float> descent_u;  // inverse information times the gradient of the normalised values
     std::vector<float> descent_v;

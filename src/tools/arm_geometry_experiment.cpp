@@ -1,0 +1,441 @@
+// Copyright (c) 2026, the view_servo authors
+// SPDX-License-Identifier: BSD-3-Clause
+#include "arm_geometry_experiment.h"
+
+#include "input_file.h"
+#include "view_servo/geometry/camera.h"
+#include "view_servo/geometry/correspondence.h"
+#include "view_servo/geometry/euclidean_homography.h"
+#include "view_servo/geometry/homography.h"
+
+#include <yaml-cpp/yaml.h>
+#include <Eigen/Geometry>
+#include <Eigen/LU>
+#include <opencv2/calib3d.hpp>
+#include <opencv2/core.hpp>
+#include <opencv2/core/eigen.hpp>
+
+#include <algorithm>
+#include <cmath>
+#include <filesystem>
+#include <fstream>
+#include <iomanip>
+#include <iostream>
+#include <iterator>
+#include <limits>
+#include <sstream>
+#include <stdexcept>
+#include <string>
+#include <vector>
+
+namespace view_servo
+{
+namespace
+{
+namespace fs = std::filesystem;
+
+constexpr double DEGREES = 180.0 / M_PI;
+constexpr int ROWS = 6;  // of the board's corners, which are in the order of rows
+constexpr int COLUMNS = 9;
+constexpr std::size_t CORNERS = ROWS * COLUMNS;
+constexpr std::size_t MIDDLE = 2 * COLUMNS + 4;
+constexpr double NONE = std::numeric_limits<double>::quiet_NaN();
+
+/** An image of the board and where the arm held the camera. */
+struct ArmView
+{
+  Eigen::Isometry3d camera_in_base;
+  Points corners;  ///< of the board [px], in the order of its squares
+};
+
+/** What eyeinhand_franka_visp holds. */
+struct ArmData
+{
+  Camera camera;
+  std::vector<ArmView> views;
+};
+
+/** Of ViSP's XML; the camera has no distortion. */
+Camera readCamera(const fs::path& file)
+{
+  std::ifstream stream = openForReading(file);
+  const std::string text{ std::istreambuf_iterator<char>(stream), std::istreambuf_iterator<char>() };
+  const auto value = [&](const std::string& tag) {
+    const std::size_t at = text.find("<" + tag + ">");
+    if (at == std::string::npos)
+    {
+      throw std::runtime_error(file.string() + " has no <" + tag + ">");
+    }
+    return std::stod(text.substr(at + tag.size() + 2));
+  };
+  Camera camera;
+  camera.width = static_cast<int>(value("image_width"));
+  camera.height = static_cast<int>(value("image_height"));
+  camera.k << value("px"), 0.0, value("u0"), 0.0, value("py"), value("v0"), 0.0, 0.0, 1.0;
+  return camera;
+}
+
+/** Position [m] and rotation vector [rad], as ViSP writes them. */
+Eigen::Isometry3d readPose(const fs::path& file)
+{
+  Eigen::Matrix<double, 6, 1> values;
+  try
+  {
+    const YAML::Node data = YAML::LoadFile(file.string())["data"];
+    for (int i = 0; i < 6; ++i)
+    {
+      values(i) = data[i][0].as<double>();
+    }
+  }
+  catch (const YAML::Exception& error)
+  {
+    throw std::runtime_error("cannot read " + file.string() + ": " + error.what());
+  }
+  const Eigen::Vector3d turn = values.tail<3>();
+  Eigen::Isometry3d pose = Eigen::Isometry3d::Identity();
+  pose.translation() = values.head<3>();
+  if (turn.norm() > 0.0)
+  {
+    pose.linear() = Eigen::AngleAxisd(turn.norm(), turn.normalized()).toRotationMatrix();
+  }
+  return pose;
+}
+
+ArmData readArmData(const fs::path& folder)
+{
+  ArmData data;
+  data.camera = readCamera(folder / "franka_camera.xml");
+  Eigen::Isometry3d camera_in_hand;
+  std::ifstream hand = openForReading(folder / "derived_eMc_park.txt");
+  for (int i = 0; i < 16; ++i)
+  {
+    hand >> camera_in_hand.matrix()(i / 4, i % 4);
+  }
+  if (!hand)
+  {
+    throw std::runtime_error("no pose in " + (folder / "derived_eMc_park.txt").string());
+  }
+  // Images count from 1, corners from 0, in order.
+  std::ifstream corners = openForReading(folder / "derived_chessboard_corners.txt");
+  for (std::string line; std::getline(corners, line);)
+  {
+    std::istringstream words(line);
+    std::size_t image = 0;
+    std::size_t corner = 0;
+    Eigen::Vector2d position;
+    if (words >> image >> corner >> position.x() >> position.y())
+    {
+      if (image > data.views.size())
+      {
+        const std::string name = "franka_pose_rPe_" + std::to_string(data.views.size() + 1) + ".yaml";
+        data.views.push_back({ readPose(folder / name) * camera_in_hand, {} });
+      }
+      if (image != data.views.size() || corner != data.views.back().corners.size())
+      {
+        throw std::runtime_error("corners are not in order: " + line);
+      }
+      data.views.back().corners.push_back(position);
+    }
+  }
+  const auto differs = [](const ArmView& view) {
+    return view.corners.size() != CORNERS;
+  };
+  if (data.views.size() < 2 || std::any_of(data.views.begin(), data.views.end(), differs))
+  {
+    throw std::runtime_error("images are missing, or corners of them: " + folder.string());
+  }
+  return data;
+}
+
+/**
+ * The corners without the distortion that the file of the camera leaves out: radial, from the squares of the board alone.
+ * @return the root mean square distance of the corners from where the board is seen then [px].
+ */
+double removeDistortion(ArmData& data)
+{
+  std::vector<cv::Point3f> board;
+  for (int row = 0; row < ROWS; ++row)
+  {
+    for (int column = 0; column < COLUMNS; ++column)
+    {
+      board.emplace_back(static_cast<float>(column), static_cast<float>(row), 0.0F);
+    }
+  }
+  std::vector<std::vector<cv::Point2f>> corners;
+  for (const ArmView& view : data.views)
+  {
+    corners.emplace_back();
+    for (const Eigen::Vector2d& corner : view.corners)
+    {
+      corners.back().emplace_back(static_cast<float>(corner.x()), static_cast<float>(corner.y()));
+    }
+  }
+  cv::Mat k;
+  cv::eigen2cv(data.camera.k, k);
+  cv::Mat distortion = cv::Mat::zeros(5, 1, CV_64F);
+  std::vector<cv::Mat> rotations;
+  std::vector<cv::Mat> translations;
+  const double rms =
+      cv::calibrateCamera(std::vector<std::vector<cv::Point3f>>(corners.size(), board), corners,
+                          cv::Size(data.camera.width, data.camera.height), k, distortion, rotations, translations,
+                          cv::CALIB_USE_INTRINSIC_GUESS | cv::CALIB_FIX_FOCAL_LENGTH | cv::CALIB_FIX_PRINCIPAL_POINT |
+                              cv::CALIB_ZERO_TANGENT_DIST | cv::CALIB_FIX_K3);
+  Camera distorted = data.camera;
+  distorted.distortion_model = "plumb_bob";
+  distorted.distortion.assign(distortion.begin<double>(), distortion.end<double>());
+  for (ArmView& view : data.views)
+  {
+    for (Eigen::Vector2d& corner : view.corners)
+    {
+      corner = (data.camera.k * distorted.normalized(corner).homogeneous()).hnormalized();
+    }
+  }
+  return rms;
+}
+
+double degreesBetween(const Eigen::Vector3d& a, const Eigen::Vector3d& b)
+{
+  return std::atan2(a.cross(b).norm(), a.dot(b)) * DEGREES;
+}
+
+/** What the homography from the reference image to another one can come from. */
+struct Comparison
+{
+  std::size_t current;
+  std::vector<EuclideanHomography> solutions;
+};
+
+std::vector<Comparison> compareAll(const ArmData& data, std::size_t reference)
+{
+  std::vector<Comparison> comparisons;
+  const Points& seen = data.views[reference].corners;
+  for (std::size_t current = 0; current < data.views.size(); ++current)
+  {
+    if (current == reference)
+    {
+      continue;
+    }
+    Correspondences pairs;
+    for (std::size_t i = 0; i < seen.size(); ++i)
+    {
+      pairs.push_back({ seen[i], data.views[current].corners[i] });
+    }
+    const auto h = homographyFromPoints(pairs);
+    comparisons.push_back({ current, {} });
+    if (h)
+    {
+      comparisons.back().solutions = decomposeHomography(refineHomography(*h, pairs), data.camera.k, seen);
+    }
+  }
+  return comparisons;
+}
+
+/** The normal that all comparisons have a solution near to: the sum of the angles to the nearest ones is least. */
+Eigen::Vector3d commonNormal(const std::vector<Comparison>& comparisons)
+{
+  Eigen::Vector3d best = Eigen::Vector3d::Constant(NONE);
+  double least = std::numeric_limits<double>::infinity();
+  for (const Comparison& proposer : comparisons)
+  {
+    for (const EuclideanHomography& proposed : proposer.solutions)
+    {
+      double sum = 0.0;
+      for (const Comparison& comparison : comparisons)
+      {
+        double nearest = 180.0;
+        for (const EuclideanHomography& solution : comparison.solutions)
+        {
+          nearest = std::min(nearest, degreesBetween(solution.normal, proposed.normal));
+        }
+        sum += nearest;
+      }
+      if (sum < least)
+      {
+        least = sum;
+        best = proposed.normal;
+      }
+    }
+  }
+  return best;
+}
+
+/** The mean of the normals next to a common one, each with the weight that the filter of planes gives it. */
+Eigen::Vector3d meanNormal(const std::vector<Comparison>& comparisons, const Eigen::Vector3d& common)
+{
+  Eigen::Vector3d sum = Eigen::Vector3d::Zero();
+  for (const Comparison& comparison : comparisons)
+  {
+    const auto nearest = std::min_element(comparison.solutions.begin(), comparison.solutions.end(),
+                                          [&](const EuclideanHomography& a, const EuclideanHomography& b) {
+                                            return a.normal.dot(common) > b.normal.dot(common);
+                                          });
+    if (nearest != comparison.solutions.end())
+    {
+      sum += nearest->translation_over_distance.squaredNorm() * nearest->normal;
+    }
+  }
+  return sum.normalized();
+}
+
+/** The error of 2.5D servoing, of a point: x - x*, y - y* (normalised), log(Z / Z*), rotation vector [rad]. */
+using ServoError = Eigen::Matrix<double, 6, 1>;
+
+/** @param current the point in the current camera, @param reference in the reference one, of the same unit of length. */
+ServoError servoError(const Eigen::Vector3d& current, const Eigen::Vector3d& reference, const Eigen::Matrix3d& rotation)
+{
+  const Eigen::AngleAxisd turn(rotation);
+  ServoError error;
+  error << current.hnormalized() - reference.hnormalized(), std::log(current.z() / reference.z()),
+      turn.angle() * turn.axis();
+  return error;
+}
+
+/** The point that the arm's cameras see at a corner, in the base's frame: least squares of the distances from rays. */
+Eigen::Vector3d triangulate(const ArmData& data, std::size_t corner)
+{
+  Eigen::Matrix3d sum = Eigen::Matrix3d::Zero();
+  Eigen::Vector3d right = Eigen::Vector3d::Zero();
+  for (const ArmView& view : data.views)
+  {
+    const Eigen::Vector3d ray =
+        (view.camera_in_base.linear() * data.camera.normalized(view.corners[corner]).homogeneous()).normalized();
+    const Eigen::Matrix3d across = Eigen::Matrix3d::Identity() - ray * ray.transpose();
+    sum += across;
+    right += across * view.camera_in_base.translation();
+  }
+  return sum.inverse() * right;
+}
+
+/** How far a motion is from the arm's [degrees]. */
+struct MotionError
+{
+  double rotation = NONE;
+  double translation = NONE;  ///< of its direction
+};
+
+MotionError compare(const EuclideanHomography& found, const Eigen::Isometry3d& arm)
+{
+  return { Eigen::AngleAxisd(found.rotation * arm.linear().transpose()).angle() * DEGREES,
+           degreesBetween(found.translation_over_distance, arm.translation()) };
+}
+
+/** Says on stdout how large errors are; NaN counts as larger than any. */
+void summarize(const std::string& name, std::vector<double> errors, double bound)
+{
+  std::replace_if(
+      errors.begin(), errors.end(), [](double e) { return std::isnan(e); }, std::numeric_limits<double>::infinity());
+  std::sort(errors.begin(), errors.end());
+  const std::size_t n = errors.size();
+  const auto within = std::upper_bound(errors.begin(), errors.end(), bound) - errors.begin();
+  std::cout << name << ": median " << 0.5 * (errors[n / 2] + errors[(n - 1) / 2]) << ", largest " << errors.back()
+            << "; " << within << " of " << n << " within " << bound << std::endl;
+}
+
+/** How far from closing the turns from image to image are, around all three images [degrees]. */
+std::vector<double> closures(const std::vector<std::vector<Eigen::Matrix3d>>& turns)
+{
+  std::vector<double> result;
+  for (std::size_t a = 0; a < turns.size(); ++a)
+  {
+    for (std::size_t b = a + 1; b < turns.size(); ++b)
+    {
+      for (std::size_t c = b + 1; c < turns.size(); ++c)
+      {
+        result.push_back(Eigen::AngleAxisd(turns[c][a] * turns[b][c] * turns[a][b]).angle() * DEGREES);
+      }
+    }
+  }
+  return result;
+}
+
+/** All rows of one way to see the camera's lens. */
+void compareWithArm(const ArmData& data, const std::string& lens, std::ostream& csv)
+{
+  const std::size_t count = data.views.size();
+  const Eigen::Vector3d point = triangulate(data, MIDDLE);
+  std::vector<double> rotations;
+  std::vector<double> translations;
+  std::vector<double> depths;
+  int ambiguous = 0;
+  int missed = 0;
+  std::vector<std::vector<Eigen::Matrix3d>> turns(count,
+                                                  std::vector<Eigen::Matrix3d>(count, Eigen::Matrix3d::Constant(NONE)));
+  for (std::size_t reference = 0; reference < count; ++reference)
+  {
+    const ArmView& goal = data.views[reference];
+    const Eigen::Vector3d seen = data.camera.normalized(goal.corners[MIDDLE]).homogeneous();
+    const std::vector<Comparison> comparisons = compareAll(data, reference);
+    const Eigen::Vector3d normal = meanNormal(comparisons, commonNormal(comparisons));
+    for (const Comparison& comparison : comparisons)
+    {
+      std::vector<EuclideanHomography> solutions = comparison.solutions;
+      std::sort(solutions.begin(), solutions.end(), [&](const EuclideanHomography& a, const EuclideanHomography& b) {
+        return degreesBetween(a.normal, normal) < degreesBetween(b.normal, normal);
+      });
+      const ArmView& view = data.views[comparison.current];
+      // X_cur = R X_ref + t
+      const Eigen::Isometry3d arm = view.camera_in_base.inverse() * goal.camera_in_base;
+      const ServoError by_arm =
+          servoError(view.camera_in_base.inverse() * point, goal.camera_in_base.inverse() * point, arm.linear());
+      MotionError chosen;
+      MotionError other;
+      double off_normal = NONE;
+      double other_off_normal = NONE;
+      ServoError by_homography = ServoError::Constant(NONE);
+      if (!solutions.empty())
+      {
+        const EuclideanHomography motion = motionBefore(solutions[0].matrix(), normal);
+        chosen = compare(motion, arm);
+        off_normal = degreesBetween(solutions[0].normal, normal);
+        // In units of Z*.
+        by_homography = servoError(motion.matrix() * seen, seen, motion.rotation);
+        turns[reference][comparison.current] = motion.rotation;
+      }
+      if (solutions.size() > 1)
+      {
+        other = compare(solutions[1], arm);
+        other_off_normal = degreesBetween(solutions[1].normal, normal);
+        ++ambiguous;
+        missed += other.rotation < chosen.rotation ? 1 : 0;
+      }
+      const ServoError difference = by_homography - by_arm;
+      rotations.push_back(chosen.rotation);
+      translations.push_back(chosen.translation);
+      depths.push_back(std::abs(difference(2)));
+      csv << lens << ',' << reference + 1 << ',' << comparison.current + 1 << ',' << arm.translation().norm() << ','
+          << Eigen::AngleAxisd(arm.linear()).angle() * DEGREES << ',' << solutions.size() << ',' << off_normal << ','
+          << other_off_normal << ',' << chosen.rotation << ',' << chosen.translation << ',' << other.rotation << ','
+          << other.translation << ',';
+      for (const double value : by_homography)
+      {
+        csv << value << ',';
+      }
+      csv << difference.head<2>().norm() << ',' << std::abs(difference(2)) << ','
+          << difference.tail<3>().norm() * DEGREES << '\n';
+    }
+  }
+  std::cout << "lens " << lens << ": " << ambiguous << " of " << rotations.size()
+            << " homographies have two decompositions; the other one's rotation is nearer to the arm's in " << missed
+            << std::endl;
+  summarize("  rotation [degrees]", rotations, 1.0);
+  summarize("  direction of the translation [degrees]", translations, 5.0);
+  summarize("  log(Z / Z*)", depths, 0.02);
+  summarize("  rotation around three images, without the arm [degrees]", closures(turns), 1.0);
+}
+
+}  // namespace
+
+void runArmGeometryExperiment(const ExperimentContext& context, std::ostream& csv)
+{
+  csv << "lens,reference,current,baseline_m,rotation_deg,solutions,off_normal_deg,other_off_normal_deg,"
+         "rotation_error_deg,translation_error_deg,other_rotation_error_deg,other_translation_error_deg,x,y,log_depth,"
+         "ux,uy,uz,position_error,log_depth_error,rotation_vector_error_deg\n"
+      << std::setprecision(8);
+  ArmData data = readArmData(context.data / "eyeinhand_franka_visp");
+  compareWithArm(data, "given", csv);
+  const double rms = removeDistortion(data);
+  std::cout << "corners after calibration of the lens: " << rms << " px" << std::endl;
+  compareWithArm(data, "calibrated", csv);
+}
+
+}  // namespace view_servo
