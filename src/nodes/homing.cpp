@@ -38,7 +38,6 @@
 #include <memory>
 #include <mutex>
 #include <optional>
-#include <sstream>
 #include <string>
 #include <thread>
 #include <utility>
@@ -49,14 +48,6 @@ namespace view_servo
 namespace
 {
 constexpr double NOT_A_NUMBER = std::numeric_limits<double>::quiet_NaN();
-
-std::string seconds(double value)
-{
-  std::ostringstream text;
-  text.precision(3);
-  text << value << " s";
-  return text.str();
-}
 
 struct Params
 {
@@ -98,16 +89,6 @@ struct Params
     reader.addFaults(limits.validate());
   }
 };
-
-Eigen::Isometry3d toIsometry(const geometry_msgs::Transform& transform)
-{
-  const Eigen::Quaterniond rotation(transform.rotation.w, transform.rotation.x, transform.rotation.y,
-                                    transform.rotation.z);
-  Eigen::Isometry3d pose = Eigen::Isometry3d::Identity();
-  pose.linear() = rotation.normalized().toRotationMatrix();
-  pose.translation() = Eigen::Vector3d(transform.translation.x, transform.translation.y, transform.translation.z);
-  return pose;
-}
 
 /** Matches as homing takes them, whoever found them. */
 struct MatchesInput
@@ -257,7 +238,7 @@ private:
     odometry_subscriber_ = nh_.subscribe("odom", 50, &HomingNode::takeOdometry, this, hints);
     points_subscriber_ = nh_.subscribe("point_matches", 1, &HomingNode::takePoints, this, hints);
     lines_subscriber_ = nh_.subscribe("line_matches", 1, &HomingNode::takeLines, this, hints);
-    status_.publish(idleStatus());
+    status_.publish(idleStatus(gate_));
     worker_ = std::thread([this] { work(); });
     // Called with the action server's lock held, so that mutex_ must never be held where action_ is called.
     action_.registerGoalCallback([this] {
@@ -357,12 +338,11 @@ private:
   /** Notes when stamps go back, as when a bag loops. The mutex is held. */
   void checkTime(ros::Time& last, const ros::Time& stamp, const std::string& what)
   {
-    const ros::Duration tolerance(0.5);  // messages may overtake each other a little
-    if (stamp + tolerance < last)
+    const std::string jump = timeJump(last, stamp, what);
+    if (!jump.empty())
     {
-      time_jump_ = "time has gone back by " + seconds((last - stamp).toSec()) + " in " + what;
+      time_jump_ = jump;
     }
-    last = stamp;
   }
 
   // ------------------------------------------------------------------------------------------------------- goals
@@ -826,29 +806,19 @@ private:
   /** Without a goal: zero for a while, then silence. */
   void idle()
   {
-    constexpr int ZEROS = 20;
-    if (zeros_sent_ < ZEROS && ever_sent_)
+    if (zeros_.due())
     {
       send(BaseVelocity::Zero());
     }
-    const std::uint8_t state = status_.last().state;
-    const bool outdated = gate_.open() ? state == ServoStatus::DISABLED : state == ServoStatus::IDLE;
-    if (outdated)
+    if (isOutdated(status_.last(), gate_))
     {
-      status_.publish(idleStatus());
+      status_.publish(idleStatus(gate_));
     }
-  }
-
-  ServoStatus idleStatus() const
-  {
-    return gate_.open() ? makeStatus(ServoStatus::IDLE, "waits for a goal")
-                        : makeStatus(ServoStatus::DISABLED, "does not drive until ~enable is called");
   }
 
   void send(const BaseVelocity& velocity)
   {
-    zeros_sent_ = velocity.isZero() ? zeros_sent_ + 1 : 0;
-    ever_sent_ = true;
+    zeros_.sent(velocity.isZero());
     geometry_msgs::TwistStamped stamped;
     stamped.header.stamp = ros::Time::now();
     stamped.header.frame_id = params_.base_frame;
@@ -928,8 +898,7 @@ private:
   BaseVelocityLimiter limiter_;
   BaseVelocity wanted_ = BaseVelocity::Zero();
   std::optional<Clock::time_point> inputs_missing_since_;
-  int zeros_sent_ = 0;
-  bool ever_sent_ = false;
+  Zeros zeros_;
   int cycles_ = 0;          // of images that commands have followed, since the last diagnosis
   double cycle_sum_ = 0.0;  // [ms]
   double cycle_max_ = 0.0;

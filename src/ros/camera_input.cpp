@@ -3,6 +3,7 @@
 #include "view_servo/ros/camera_input.h"
 
 #include "view_servo/ros/conversions.h"
+#include "view_servo/ros/node_base.h"
 #include "view_servo/views/image_io.h"
 
 #include <ros/console.h>
@@ -10,7 +11,6 @@
 
 #include <cmath>
 #include <cstdint>
-#include <sstream>
 #include <utility>
 
 namespace view_servo
@@ -19,14 +19,6 @@ namespace
 {
 constexpr double CHECK_PERIOD = 5.0;   // [s]
 constexpr double ERROR_PERIOD = 10.0;  // [s]
-
-std::string seconds(double value)
-{
-  std::ostringstream text;
-  text.precision(3);
-  text << value << " s";
-  return text.str();
-}
 
 }  // namespace
 

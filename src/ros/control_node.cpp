@@ -6,6 +6,7 @@
 
 #include <csignal>
 #include <limits>
+#include <utility>
 
 namespace view_servo
 {
@@ -76,6 +77,24 @@ ServoStatus makeStatus(std::uint8_t state, const std::string& reason)
   status.rotation_error = std::numeric_limits<double>::quiet_NaN();
   status.point_error = std::numeric_limits<double>::quiet_NaN();
   return status;
+}
+
+ServoStatus idleStatus(const CommandGate& gate)
+{
+  return gate.open() ? makeStatus(ServoStatus::IDLE, "waits for a goal")
+                     : makeStatus(ServoStatus::DISABLED, "does not drive until ~enable is called");
+}
+
+bool isOutdated(const ServoStatus& last, const CommandGate& gate)
+{
+  return last.state == (gate.open() ? ServoStatus::DISABLED : ServoStatus::IDLE);
+}
+
+std::string timeJump(ros::Time& last, const ros::Time& stamp, const std::string& what)
+{
+  const ros::Duration tolerance(0.5);
+  const ros::Time before = std::exchange(last, stamp);
+  return stamp + tolerance < before ? "time has gone back by " + seconds((before - stamp).toSec()) + " in " + what : "";
 }
 
 void detail::deferShutdown()

@@ -19,18 +19,19 @@ namespace
 {
 constexpr double NOT_A_NUMBER = std::numeric_limits<double>::quiet_NaN();
 
-geometry_msgs::Vector3 unknownVector()
+/** A homography message that says nothing. */
+Homography unknownHomography(const std::string& view, const std_msgs::Header& header)
 {
-  geometry_msgs::Vector3 vector;
-  vector.x = vector.y = vector.z = NOT_A_NUMBER;
-  return vector;
-}
-
-geometry_msgs::Quaternion unknownRotation()
-{
-  geometry_msgs::Quaternion rotation;
-  rotation.x = rotation.y = rotation.z = rotation.w = NOT_A_NUMBER;
-  return rotation;
+  Homography message;
+  message.header = header;
+  message.view = view;
+  message.state = Homography::SEARCHING;
+  copyRowMajor(Eigen::Matrix3d::Constant(NOT_A_NUMBER), message.h);
+  message.rms_error = NOT_A_NUMBER;
+  message.rotation.x = message.rotation.y = message.rotation.z = message.rotation.w = NOT_A_NUMBER;
+  message.translation_over_distance = message.normal = toMessage(Eigen::Vector3d::Constant(NOT_A_NUMBER));
+  message.distance = NOT_A_NUMBER;
+  return message;
 }
 
 /** Encodings whose channels are not in the order the core reads: they have to pass through cv_bridge. */
@@ -223,21 +224,77 @@ std::vector<double> toRowMajor(const std::vector<Eigen::Matrix3d>& matrices)
 
 Homography toHomography(const ViewMatch& match, const std::string& view, const std_msgs::Header& header)
 {
-  const bool valid = match.outcome == MatchOutcome::MATCHED && match.model == GeometryModel::HOMOGRAPHY;
-
-  Homography message;
-  message.header = header;
-  message.view = view;
-  message.state = valid ? Homography::TRACKING : Homography::SEARCHING;
-  message.valid = valid;
-  copyRowMajor(valid ? match.matrix : Eigen::Matrix3d::Constant(NOT_A_NUMBER).eval(), message.h);
+  Homography message = unknownHomography(view, header);
   message.matches = static_cast<std::int32_t>(match.matches.size());
-  message.inliers = valid ? match.inliers : 0;
-  message.rms_error = valid ? match.rms_error : NOT_A_NUMBER;
-  message.rotation = unknownRotation();
-  message.translation_over_distance = unknownVector();
-  message.normal = unknownVector();
-  message.distance = NOT_A_NUMBER;
+  message.valid = match.outcome == MatchOutcome::MATCHED && match.model == GeometryModel::HOMOGRAPHY;
+  if (!message.valid)
+  {
+    message.reason = match.message;
+    return message;
+  }
+  message.state = Homography::TRACKING;
+  copyRowMajor(match.matrix, message.h);
+  message.inliers = match.inliers;
+  message.rms_error = match.rms_error;
+  return message;
+}
+
+Homography toHomography(const PlaneTrack& track, const std::string& view, const std_msgs::Header& header,
+                        const std::string& reason)
+{
+  Homography message = unknownHomography(view, header);
+  message.matches = track.homography.looked_for;
+  message.valid = track.state == TrackingState::TRACKING;
+  if (!message.valid)
+  {
+    message.state = track.state == TrackingState::LOST ? Homography::LOST : Homography::SEARCHING;
+    message.reason = reason;
+    return message;
+  }
+  message.state = Homography::TRACKING;
+  copyRowMajor(track.homography.h, message.h);
+  message.inliers = track.homography.supporting;
+  message.rms_error = track.homography.rms;
+  if (track.plane)
+  {
+    const EuclideanHomography& motion = track.plane->motion;
+    const Eigen::Quaterniond rotation(motion.rotation);
+    message.rotation.x = rotation.x();
+    message.rotation.y = rotation.y();
+    message.rotation.z = rotation.z();
+    message.rotation.w = rotation.w();
+    message.translation_over_distance = toMessage(motion.translation_over_distance);
+    if (track.plane->normal_known)
+    {
+      message.normal = toMessage(motion.normal);
+    }
+    message.distance = track.plane->distance.value_or(NOT_A_NUMBER);
+    message.ambiguous = track.plane->ambiguous;
+  }
+  return message;
+}
+
+Eigen::Isometry3d toIsometry(const geometry_msgs::Transform& transform)
+{
+  const Eigen::Quaterniond rotation(transform.rotation.w, transform.rotation.x, transform.rotation.y,
+                                    transform.rotation.z);
+  Eigen::Isometry3d pose = Eigen::Isometry3d::Identity();
+  pose.linear() = rotation.normalized().toRotationMatrix();
+  pose.translation() = toVector(transform.translation);
+  return pose;
+}
+
+Eigen::Vector3d toVector(const geometry_msgs::Vector3& vector)
+{
+  return { vector.x, vector.y, vector.z };
+}
+
+geometry_msgs::Vector3 toMessage(const Eigen::Vector3d& vector)
+{
+  geometry_msgs::Vector3 message;
+  message.x = vector.x();
+  message.y = vector.y();
+  message.z = vector.z();
   return message;
 }
 

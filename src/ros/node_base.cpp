@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cstdlib>  // says whether this is glibc
+#include <sstream>
 
 #ifdef __GLIBC__
 #include <malloc.h>
@@ -28,6 +29,14 @@ std::string oneLine(const std::exception& error)
   }
   std::replace(text.begin(), text.end(), '\n', ' ');
   return text;
+}
+
+std::string seconds(double value)
+{
+  std::ostringstream text;
+  text.precision(3);
+  text << value << " s";
+  return text.str();
 }
 
 void keepFreedMemory()

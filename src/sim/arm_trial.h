@@ -36,7 +36,7 @@ struct ArmTrialParams
 {
   PlaneTrackerParams tracker;
   Servo25dParams servo;
-  VelocityLimits limits{ 0.15, 0.6, 0.5, 2.0 };
+  VelocityLimits limits = ARM_LIMITS;
   ArmConditions conditions;
   double control_period = 0.02;  ///< [s]
   double image_delay = 0.05;     ///< from an image's stamp until servoing knows what it says [s]

@@ -273,22 +273,22 @@ public:
     return fitted;
   }
 
-  /** How many shifts a fit explains to a residual, and the RMS of these [px]. */
-  int supporting(const Eigen::Matrix3d& fitted, double max_residual, double& rms) const
+  /** Where the shifts are that a fit explains to a residual, and the RMS of these [px]. */
+  Points supporting(const Eigen::Matrix3d& fitted, double max_residual, double& rms) const
   {
-    int count = 0;
+    Points points;
     double squares = 0.0;
     for (const Shift& shift : shifts_)
     {
       const double squared = (shift.shift + shift.at - transfer(fitted, shift.at)).squaredNorm();
       if (squared <= max_residual * max_residual)
       {
-        ++count;
+        points.push_back(shift.at);
         squares += squared;
       }
     }
-    rms = std::sqrt(squares / std::max(count, 1));
-    return count;
+    rms = std::sqrt(squares / static_cast<double>(std::max<std::size_t>(points.size(), 1)));
+    return points;
   }
 
 private:
@@ -718,7 +718,8 @@ TrackedHomography HomographyTracker::trackFrom(const std::vector<cv::Mat>& pyram
       h_level = h_level * left->inverse();
       if (level == 0)
       {
-        result.supporting = fit.supporting(*left, params_.max_residual, result.rms);
+        result.points = fit.supporting(*left, params_.max_residual, result.rms);
+        result.supporting = static_cast<int>(result.points.size());
       }
     }
     h = down.inverse() * h_level * down;
@@ -726,6 +727,7 @@ TrackedHomography HomographyTracker::trackFrom(const std::vector<cv::Mat>& pyram
     {
       h = predicted;
       result.supporting = 0;
+      result.points.clear();
     }
   }
   const int enough =

@@ -21,6 +21,7 @@ namespace
 /** The images are scaled so that their widths add up to something between these [px]. */
 constexpr double MIN_WIDTH = 800.0;
 constexpr double MAX_WIDTH = 1600.0;
+constexpr double MIN_FOLLOWED_WIDTH = 400.0;  // of a single one [px]
 
 constexpr int GAP = 4;              // between the images [px]
 constexpr int CAPTION_HEIGHT = 30;  // [px]
@@ -40,6 +41,8 @@ const cv::Scalar BACKGROUND(32, 32, 32);
 const cv::Scalar CAPTION_COLOUR(235, 235, 235);
 const cv::Scalar CANDIDATE_COLOUR(150, 150, 150);
 const cv::Scalar OUTLINE_COLOUR(80, 255, 255);
+const cv::Scalar FOUND_COLOUR(60, 220, 60);
+const cv::Scalar MISSING_COLOUR(60, 60, 240);
 
 /** Where an image lies in the picture. */
 struct Placement
@@ -317,6 +320,38 @@ cv::Mat drawOverlay(const PreparedImage& reference, const PreparedImage& current
     drawOutline(polygon, { right, picture });
   }
   writeCaption(caption(match), picture.rowRange(images.height, picture.rows));
+  return picture;
+}
+
+cv::Mat drawFollowedView(const cv::Mat& current, const FollowedView& view)
+{
+  const double width = current.cols;
+  const double scale = std::clamp(width, MIN_FOLLOWED_WIDTH, MAX_WIDTH) / width;
+  const cv::Size size(cvRound(width * scale), std::max(cvRound(current.rows * scale), 1));
+  const Placement place{ cv::Rect(cv::Point(), size), scale };
+  cv::Mat picture(size.height + CAPTION_HEIGHT, size.width, CV_8UC3, BACKGROUND);
+  drawImage(current, place, picture);
+  Canvas canvas(place, picture);
+  if (view.h.allFinite())
+  {
+    const auto draw = [&](const Points& points, const cv::Scalar& colour) {
+      for (const Eigen::Vector2d& point : points)
+      {
+        const Eigen::Vector2d at = transfer(view.h, point);
+        if (at.allFinite() && (at.array() >= 0.0).all() && at.x() < current.cols && at.y() < current.rows)
+        {
+          drawDot(canvas.area, canvas.place(at), 2.5, colour);
+        }
+      }
+    };
+    draw(view.missing, MISSING_COLOUR);
+    draw(view.found, FOUND_COLOUR);
+    Points polygon = outline(view.region);
+    std::transform(polygon.begin(), polygon.end(), polygon.begin(),
+                   [&](const Eigen::Vector2d& point) { return transfer(view.h, point); });
+    drawOutline(polygon, canvas);
+  }
+  writeCaption(view.text, picture.rowRange(size.height, picture.rows));
   return picture;
 }
 

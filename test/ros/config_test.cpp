@@ -1,6 +1,8 @@
 // Copyright (c) 2026, the view_servo authors
 // SPDX-License-Identifier: BSD-3-Clause
 #include "view_servo/control/homing_parameters.h"
+#include "view_servo/control/servo_parameters.h"
+#include "view_servo/tracking/homography_tracker_parameters.h"
 #include "view_servo/views/matcher_parameters.h"
 
 #include <gtest/gtest.h>
@@ -57,6 +59,23 @@ TEST(Config, HomingHasEveryParameterAtItsDefault)
       "homing.yaml", homingParameters(params, limits),
       { "view", "views_dir", "base_frame", "point_matcher", "line_matcher", "dry_run", "timeout", "control_rate",
         "image_timeout", "odometry_timeout", "match_timeout", "image_transport", "queue_size", "max_image_age" });
+}
+
+TEST(Config, HomographyTrackerHasEveryParameterAtItsDefault)
+{
+  PlaneTrackerParams params;
+  expectEveryParameterAtItsDefault("homography_tracker.yaml", homographyTrackerParameters(params),
+                                   { "view", "views_dir", "odom_frame", "tf_patience", "point_matcher", "match_period",
+                                     "image_transport", "queue_size", "max_image_age" });
+}
+
+TEST(Config, ServoHasEveryParameterAtItsDefault)
+{
+  Servo25dParams params;
+  VelocityLimits limits = ARM_LIMITS;
+  expectEveryParameterAtItsDefault("servo_25d.yaml", servoParameters(params, limits),
+                                   { "views_dir", "homography_tracker", "dry_run", "timeout", "acquire_timeout",
+                                     "control_rate", "homography_timeout", "max_homography_age", "joint_margin" });
 }
 
 }  // namespace

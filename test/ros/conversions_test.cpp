@@ -309,6 +309,54 @@ TEST(MatchConversion, CopiesMatchesAndWritesTheMatrixByRows)
   EXPECT_TRUE(std::isnan(homography.rotation.w));
 }
 
+TEST(TrackConversion, TellsWhatIsKnownAndNothingElse)
+{
+  std_msgs::Header header;
+  header.frame_id = "camera";
+  PlaneTrack track;
+  track.state = TrackingState::TRACKING;
+  track.homography.h = 2.0 * Eigen::Matrix3d::Identity();
+  track.homography.looked_for = 50;
+  track.homography.supporting = 40;
+  track.homography.rms = 0.3;
+  PlaneEstimate plane;
+  plane.motion.rotation = Eigen::AngleAxisd(M_PI / 2.0, Eigen::Vector3d::UnitX()).toRotationMatrix();
+  plane.motion.translation_over_distance = { 1.0, 2.0, 3.0 };
+  plane.motion.normal = Eigen::Vector3d::UnitZ();
+  plane.ambiguous = true;
+  track.plane = plane;
+  Homography message = toHomography(track, "desk", header, "no reason");
+  EXPECT_EQ(message.header, header);
+  EXPECT_EQ(message.view, "desk");
+  EXPECT_EQ(message.state, Homography::TRACKING);
+  EXPECT_TRUE(message.valid);
+  EXPECT_EQ(message.reason, "");
+  EXPECT_EQ(message.h[4], 2.0);
+  EXPECT_EQ(message.matches, 50);
+  EXPECT_EQ(message.inliers, 40);
+  EXPECT_EQ(message.rms_error, 0.3);
+  EXPECT_NEAR(message.rotation.x, std::sqrt(0.5), 1e-12);
+  EXPECT_NEAR(message.rotation.w, std::sqrt(0.5), 1e-12);
+  EXPECT_EQ(message.translation_over_distance.y, 2.0);
+  EXPECT_TRUE(std::isnan(message.normal.z));
+  EXPECT_TRUE(std::isnan(message.distance));
+  EXPECT_TRUE(message.ambiguous);
+
+  track.plane->normal_known = true;
+  track.plane->distance = 0.7;
+  message = toHomography(track, "desk", header, "");
+  EXPECT_EQ(message.normal.z, 1.0);
+  EXPECT_EQ(message.distance, 0.7);
+
+  track.state = TrackingState::LOST;
+  message = toHomography(track, "desk", header, "it is dark");
+  EXPECT_EQ(message.state, Homography::LOST);
+  EXPECT_FALSE(message.valid);
+  EXPECT_EQ(message.reason, "it is dark");
+  EXPECT_TRUE(std::isnan(message.h[0]));
+  EXPECT_TRUE(std::isnan(message.rotation.w));
+}
+
 TEST(MatchConversion, CopiesLinesAndWritesPlanesByRows)
 {
   const std::vector<MatchedLine> lines = {
@@ -343,9 +391,11 @@ TEST(MatchConversion, HasNoNumbersWithoutGeometry)
   match.outcome = MatchOutcome::NO_GEOMETRY;
   match.matrix.setIdentity();
   match.inliers = 3;
+  match.message = "nothing there";
   const Homography homography = toHomography(match, "desk", std_msgs::Header());
   EXPECT_EQ(homography.state, Homography::SEARCHING);
   EXPECT_FALSE(homography.valid);
+  EXPECT_EQ(homography.reason, "nothing there");
   EXPECT_EQ(homography.inliers, 0);
   EXPECT_TRUE(std::isnan(homography.h[0]));
   EXPECT_TRUE(std::isnan(homography.rms_error));

@@ -78,6 +78,10 @@ public:
   {
     kill(-pid_, SIGINT);
   }
+  void terminate() const
+  {
+    kill(-pid_, SIGTERM);
+  }
 
   bool exited()
   {

@@ -273,3 +273,26 @@ TEST(Overlay, drawsTheOutlineWhenLinesHaveOnePlane)
     EXPECT_EQ(drawn, planes == 1);
   }
 }
+
+TEST(FollowedView, ShowsOutlinePointsAndText)
+{
+  const cv::Mat current(200, 450, CV_8UC1, cv::Scalar(100));
+  view_servo::FollowedView view;
+  view.region = cv::Rect(40, 30, 61, 61);
+  view.h = shift(100.0, 20.0);
+  view.found = { { 60.0, 60.0 } };
+  view.missing = { { 80.0, 60.0 } };
+  view.text = "goal: tracking";
+  const cv::Mat picture = view_servo::drawFollowedView(current, view);
+  EXPECT_EQ(picture.cols, 450);
+  EXPECT_GT(picture.rows, 200);
+  EXPECT_GT(colouredPixels(picture, around(140, 80)), 5);  // the left side of the outline
+  const auto found = picture.at<cv::Vec3b>(80, 160);
+  const auto missing = picture.at<cv::Vec3b>(80, 180);
+  EXPECT_GT(found[1], found[2]);
+  EXPECT_GT(missing[2], missing[1]);
+
+  view.h.setConstant(std::numeric_limits<double>::quiet_NaN());
+  const cv::Mat lost = view_servo::drawFollowedView(current, view);
+  EXPECT_EQ(colouredPixels(lost, cv::Rect(0, 0, 450, 200)), 0);
+}

@@ -28,6 +28,9 @@ struct VelocityLimits
   std::vector<std::string> validate() const;
 };
 
+/** What a camera in an arm's hand may do, unless told otherwise. */
+inline const VelocityLimits ARM_LIMITS{ 0.15, 0.6, 0.5, 2.0 };
+
 /**
  * Keeps commands within limits: the whole velocity is scaled, so that its direction stays, and changes gradually. Its
  * first `LINEAR` numbers are a speed, the others, `ANGULAR` of them, a turn rate.

@@ -69,6 +69,40 @@ private:
 /** A status without errors or inliers, stamped now. */
 ServoStatus makeStatus(std::uint8_t state, const std::string& reason);
 
+/** That of a node without a goal. */
+ServoStatus idleStatus(const CommandGate& gate);
+
+/** Whether idleStatus() has to be told, because the gate has been switched since the last status. */
+bool isOutdated(const ServoStatus& last, const CommandGate& gate);
+
+/** Who has moved something sends zeros for a while after, and then nothing: others may drive, too. */
+class Zeros
+{
+public:
+  /** A command was sent. */
+  void sent(bool zero)
+  {
+    count_ = zero ? count_ + 1 : 0;
+    ever_ = true;
+  }
+  /** Whether without anything to do a zero is still to be sent. */
+  bool due() const
+  {
+    constexpr int ENOUGH = 20;
+    return ever_ && count_ < ENOUGH;
+  }
+
+private:
+  int count_ = 0;
+  bool ever_ = false;
+};
+
+/**
+ * Says when stamps go back, as when a bag loops; empty: they do not. Messages may overtake each other a little.
+ * @param last stamp so far, is set. @param what has the stamps.
+ */
+std::string timeJump(ros::Time& last, const ros::Time& stamp, const std::string& what);
+
 namespace detail
 {
 /** Has SIGINT, SIGTERM and the master's order to shut down only ask for an end, so that a node can stop its robot first. */

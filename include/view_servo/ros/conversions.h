@@ -8,16 +8,20 @@
 #include "view_servo/PointMatch.h"
 #include "view_servo/geometry/camera.h"
 #include "view_servo/geometry/line_segment.h"
+#include "view_servo/tracking/plane_tracker.h"
 #include "view_servo/views/view_matcher.h"
 #include "view_servo/views/view_store.h"
 
 #include <geometry_msgs/PoseStamped.h>
+#include <geometry_msgs/Transform.h>
 #include <geometry_msgs/TransformStamped.h>
+#include <geometry_msgs/Vector3.h>
 #include <sensor_msgs/CameraInfo.h>
 #include <sensor_msgs/Image.h>
 #include <sensor_msgs/RegionOfInterest.h>
 #include <std_msgs/Header.h>
 #include <Eigen/Core>
+#include <Eigen/Geometry>
 #include <opencv2/core/mat.hpp>
 
 #include <string>
@@ -71,5 +75,15 @@ std::vector<double> toRowMajor(const std::vector<Eigen::Matrix3d>& matrices);
 
 /** State TRACKING and valid when `match` found a homography, else SEARCHING; not decomposed. */
 Homography toHomography(const ViewMatch& match, const std::string& view, const std_msgs::Header& header);
+
+/** With what is known of motion and plane. @param reason why it is not tracking. */
+Homography toHomography(const PlaneTrack& track, const std::string& view, const std_msgs::Header& header,
+                        const std::string& reason);
+
+/** A pose as tf gives it: target <- source. */
+Eigen::Isometry3d toIsometry(const geometry_msgs::Transform& transform);
+
+Eigen::Vector3d toVector(const geometry_msgs::Vector3& vector);
+geometry_msgs::Vector3 toMessage(const Eigen::Vector3d& vector);
 
 }  // namespace view_servo

@@ -20,6 +20,9 @@ namespace view_servo
 /** An exception's text without line breaks. */
 std::string oneLine(const std::exception& error);
 
+/** A time [s] for people. */
+std::string seconds(double value);
+
 /**
  * Lets the process keep the memory that it has freed. Images come and go with every cycle; to ask the system for them
  * each time costs a third of the time that it takes to work on them. Does nothing where the C library is not glibc.

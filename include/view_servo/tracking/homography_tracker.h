@@ -2,6 +2,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include "view_servo/geometry/correspondence.h"
+
 #include <Eigen/Core>
 #include <opencv2/core/mat.hpp>
 
@@ -34,6 +36,7 @@ struct TrackedHomography
   Eigen::Matrix3d h = Eigen::Matrix3d::Constant(std::numeric_limits<double>::quiet_NaN());  ///< x_cur ~ H x_ref
   int looked_for = 0;                                     ///< points predicted to be in the image
   int supporting = 0;                                     ///< of these, found where the homography sends them
+  Points points;                                          ///< the supporting ones, in the stored view [px]
   double rms = std::numeric_limits<double>::quiet_NaN();  ///< of the supporting points [px]
 };
 

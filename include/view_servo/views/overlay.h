@@ -2,9 +2,14 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include "view_servo/geometry/correspondence.h"
 #include "view_servo/views/view_matcher.h"
 
+#include <Eigen/Core>
 #include <opencv2/core/mat.hpp>
+#include <opencv2/core/types.hpp>
+
+#include <string>
 
 namespace view_servo
 {
@@ -16,5 +21,18 @@ namespace view_servo
  * reference's region is drawn in both images. A line of text below says what was found (or why nothing was).
  */
 cv::Mat drawOverlay(const PreparedImage& reference, const PreparedImage& current, const ViewMatch& match);
+
+/** A stored view that is followed through images. */
+struct FollowedView
+{
+  cv::Rect region;    ///< of the stored view [px]
+  Eigen::Matrix3d h;  ///< x_cur ~ H x_ref; NaN: not found
+  Points found;       ///< points of the stored view that were found [px]
+  Points missing;     ///< those that were not [px]
+  std::string text;   ///< one line
+};
+
+/** A picture of it, BGR: the outline of the region, found points green, missing ones red, the text below. */
+cv::Mat drawFollowedView(const cv::Mat& current, const FollowedView& view);
 
 }  // namespace view_servo

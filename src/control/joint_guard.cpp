@@ -1,0 +1,73 @@
+// Copyright (c) 2026, the view_servo authors
+// SPDX-License-Identifier: BSD-3-Clause
+#include "view_servo/control/joint_guard.h"
+
+#include <cmath>
+#include <cstddef>
+#include <cstdio>
+#include <utility>
+
+namespace view_servo
+{
+JointGuard::JointGuard(std::map<std::string, JointLimits> limits, double margin)
+  : limits_(std::move(limits)), margin_(margin)
+{
+}
+
+void JointGuard::add(double time, const std::vector<std::string>& names, const std::vector<double>& positions,
+                     const std::vector<double>& velocities)
+{
+  for (std::size_t i = 0; i < names.size() && i < positions.size(); ++i)
+  {
+    if (limits_.count(names[i]) == 0 || !std::isfinite(positions[i]))
+    {
+      continue;
+    }
+    Joint joint{ time, positions[i], 0.0 };
+    const auto before = joints_.find(names[i]);
+    if (velocities.size() == positions.size())
+    {
+      joint.velocity = velocities[i];
+    }
+    else if (before != joints_.end() && time > before->second.time)
+    {
+      joint.velocity = (joint.position - before->second.position) / (time - before->second.time);
+    }
+    joints_[names[i]] = joint;
+  }
+}
+
+std::string JointGuard::problem(double time)
+{
+  constexpr double STANDS = 1e-3;    // [1/s]
+  constexpr double PATIENCE = 0.15;  // [s]
+  std::string worst;
+  for (const auto& [name, joint] : joints_)
+  {
+    const JointLimits& limits = limits_.at(name);
+    const bool low = joint.position < limits.lower + margin_;
+    const bool high = joint.position > limits.upper - margin_;
+    const double outwards = low ? -joint.velocity : joint.velocity;
+    if ((!low && !high) || outwards < -STANDS)
+    {
+      stuck_since_.erase(name);
+      continue;
+    }
+    const double since = stuck_since_.emplace(name, time).first->second;
+    if (outwards > STANDS || time - since > PATIENCE)
+    {
+      char text[60];
+      std::snprintf(text, sizeof(text), "' is at %.3f, its limit is %.3f", joint.position,
+                    low ? limits.lower : limits.upper);
+      worst = "joint limit reached: '" + name + text;
+    }
+  }
+  return worst;
+}
+
+void JointGuard::rest()
+{
+  stuck_since_.clear();
+}
+
+}  // namespace view_servo

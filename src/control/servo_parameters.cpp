@@ -1,0 +1,25 @@
+// Copyright (c) 2026, the view_servo authors
+// SPDX-License-Identifier: BSD-3-Clause
+#include "view_servo/control/servo_parameters.h"
+
+namespace view_servo
+{
+std::vector<Parameter> servoParameters(Servo25dParams& params, VelocityLimits& limits)
+{
+  return {
+    real("gain", params.gain, "rate at which a large error decays [1/s], > 0"),
+    real("near_gain", params.near_gain, "likewise of a small one [1/s], >= gain"),
+    real("margin", params.margin, "part of the image's sides that the chosen point stays out of, [0, 0.3]"),
+    real("distance", params.distance, "of the plane from the view until it is known [m], > 0"),
+    real("translation_tolerance", params.translation_tolerance, "of being at the view [m], > 0"),
+    real("rotation_tolerance", params.rotation_tolerance, "likewise [rad], > 0"),
+    real("dwell", params.dwell, "time within the tolerances [s], >= 0"),
+    real("lost_timeout", params.lost_timeout, "without the view, after which it gives up [s], > 0"),
+    real("max_speed", limits.max_speed, "of the camera [m/s], > 0"),
+    real("max_turn_rate", limits.max_turn_rate, "[rad/s], > 0"),
+    real("max_acceleration", limits.max_acceleration, "[m/s^2], > 0"),
+    real("max_turn_acceleration", limits.max_turn_acceleration, "[rad/s^2], > 0"),
+  };
+}
+
+}  // namespace view_servo

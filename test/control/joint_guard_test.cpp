@@ -1,0 +1,71 @@
+// Copyright (c) 2026, the view_servo authors
+// SPDX-License-Identifier: BSD-3-Clause
+#include "view_servo/control/joint_guard.h"
+
+#include <gtest/gtest.h>
+
+#include <limits>
+#include <string>
+
+namespace view_servo
+{
+namespace
+{
+class JointGuardTest : public ::testing::Test
+{
+protected:
+  void at(double time, double position, double velocity)
+  {
+    guard_.add(time, { "free", "elbow" }, { 9.0, position }, { 0.0, velocity });
+  }
+
+  JointGuard guard_{ { { "elbow", { -1.0, 2.0 } }, { "never_seen", { 0.0, 1.0 } } }, 0.02 };
+};
+
+TEST_F(JointGuardTest, SaysNothingWithinTheLimits)
+{
+  at(0.0, 1.97, 1.0);
+  EXPECT_EQ(guard_.problem(0.0), "");
+  at(0.0, -0.97, -1.0);
+  EXPECT_EQ(guard_.problem(0.0), "");
+}
+
+TEST_F(JointGuardTest, NamesAJointThatMovesOnAtItsLimit)
+{
+  at(0.0, 1.99, 0.1);
+  EXPECT_NE(guard_.problem(0.0).find("'elbow' is at 1.990, its limit is 2.000"), std::string::npos);
+  at(0.0, -0.99, -0.1);
+  EXPECT_NE(guard_.problem(0.0).find("-1.000"), std::string::npos);
+}
+
+TEST_F(JointGuardTest, LetsAJointComeAway)
+{
+  at(0.0, 1.99, 0.0);
+  EXPECT_EQ(guard_.problem(0.0), "");
+  at(0.1, 1.99, -0.1);
+  EXPECT_EQ(guard_.problem(0.1), "");
+  at(0.3, 1.99, 0.0);  // begins to stand anew
+  EXPECT_EQ(guard_.problem(0.3), "");
+  EXPECT_NE(guard_.problem(0.5), "");
+  guard_.rest();
+  EXPECT_EQ(guard_.problem(0.6), "");
+}
+
+TEST_F(JointGuardTest, TakesVelocitiesFromPositions)
+{
+  guard_.add(0.0, { "elbow" }, { 1.985 }, {});
+  guard_.add(0.1, { "elbow" }, { 1.990 }, {});
+  EXPECT_NE(guard_.problem(0.1), "");
+  guard_.add(0.2, { "elbow" }, { 1.985 }, {});
+  EXPECT_EQ(guard_.problem(0.2), "");
+}
+
+TEST_F(JointGuardTest, IsNotConfusedByNonsense)
+{
+  guard_.add(0.0, { "elbow", "free" }, {}, {});
+  guard_.add(0.0, { "elbow" }, { std::numeric_limits<double>::quiet_NaN() }, {});
+  EXPECT_EQ(guard_.problem(1.0), "");
+}
+
+}  // namespace
+}  // namespace view_servo

@@ -1,0 +1,231 @@
+// Copyright (c) 2026, the view_servo authors
+// SPDX-License-Identifier: BSD-3-Clause
+#include "child_process.h"
+#include "node_test.h"
+#include "sim/renderer.h"
+#include "sim/visibility.h"
+#include "sim/world.h"
+#include "support/recorded_bag.h"
+#include "support/temporary_directory.h"
+
+#include "view_servo/Homography.h"
+#include "view_servo/ServoError.h"
+#include "view_servo/ServoToViewAction.h"
+#include "view_servo/control/servo_25d.h"
+#include "view_servo/control/velocity_limiter.h"
+#include "view_servo/views/view_store.h"
+
+#include <actionlib/client/simple_action_client.h>
+#include <geometry_msgs/TwistStamped.h>
+#include <gtest/gtest.h>
+#include <Eigen/Geometry>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstdlib>
+#include <iterator>
+#include <map>
+#include <memory>
+#include <string>
+#include <vector>
+
+namespace view_servo
+{
+namespace test
+{
+namespace
+{
+/** What the ground truth says of the view and the plane that its region shows. */
+class TrueView
+{
+public:
+  explicit TrueView(const sim::World& world) : world_(world)
+  {
+    const cv::Rect& region = world.region;
+    const double right = region.x + region.width - 1.0;
+    const double bottom = region.y + region.height - 1.0;
+    corners_ = { Eigen::Vector2d(region.x, region.y), Eigen::Vector2d(right, region.y), Eigen::Vector2d(right, bottom),
+                 Eigen::Vector2d(region.x, bottom) };
+    std::vector<Eigen::Vector3d> on_plane;  // in the view's camera frame
+    for (const Eigen::Vector2d& corner : corners_)
+    {
+      const Eigen::Vector3d ray = (world.camera.k.inverse() * corner.homogeneous()).normalized();
+      const auto hit = sim::firstHit(world, world.goal.translation(), world.goal.linear() * ray);
+      EXPECT_TRUE(hit);
+      on_plane.push_back(hit.value_or(1.0) * ray);
+    }
+    normal_ = (on_plane[1] - on_plane[0]).cross(on_plane[3] - on_plane[0]).normalized();
+    distance_ = normal_.dot(on_plane[0]);
+    EXPECT_GT(distance_, 0.0);
+  }
+
+  PlaneView view(double stamp, const Eigen::Isometry3d& camera) const
+  {
+    const Eigen::Isometry3d motion = camera.inverse() * world_.goal;
+    return { stamp, { motion.linear(), motion.translation() / distance_, normal_ }, distance_, 100 };
+  }
+
+  /** Of the region's corners, the largest [px]. */
+  double cornerError(const Eigen::Matrix3d& h, const Eigen::Isometry3d& camera) const
+  {
+    const Eigen::Matrix3d& k = world_.camera.k;
+    const Eigen::Matrix3d truth = k * view(0.0, camera).motion.matrix() * k.inverse();
+    double largest = 0.0;
+    for (const Eigen::Vector2d& corner : corners_)
+    {
+      const Eigen::Vector2d expected = (truth * corner.homogeneous()).hnormalized();
+      largest = std::max(largest, ((h * corner.homogeneous()).hnormalized() - expected).norm());
+    }
+    return largest;
+  }
+
+  ServoTarget target() const
+  {
+    return { world_.camera.k,
+             { world_.camera.width, world_.camera.height },
+             { 0.5 * (corners_[0].x() + corners_[2].x()), 0.5 * (corners_[0].y() + corners_[2].y()) } };
+  }
+
+private:
+  const sim::World& world_;
+  std::array<Eigen::Vector2d, 4> corners_;
+  Eigen::Vector3d normal_;
+  double distance_;
+};
+
+/** Speeds as parts of what the arm may do, so that turns and translations count alike. */
+Twist relative(Twist twist)
+{
+  twist.head<3>() /= ARM_LIMITS.max_speed;
+  twist.tail<3>() /= ARM_LIMITS.max_turn_rate;
+  return twist;
+}
+
+TEST(ArmReplay, HomographiesAndTwistsAgreeWithTheTruth)
+{
+  constexpr double TOLERANCE = 2.0;       // of the region's corners [px]
+  constexpr double LEAST_SHARE = 0.95;    // of the homographies, and of the commands
+  constexpr double LEAST_ANSWERED = 0.6;  // of the images; a busy machine leaves some out
+  constexpr double FAR = 0.02;            // [m]
+  constexpr double LARGEST_ANGLE = 15.0;  // between twists [degrees]
+  constexpr double RAMP = 0.6;            // until a limited command has the direction of the one wanted [s]
+
+  const TemporaryDirectory directory;
+  const std::string bag = directory.path() / "approach.bag";
+  const std::string file = PACKAGE_DIR "/config/worlds/rice.yaml";
+  const std::string command = "'" RECORD_BAG_BINARY "' '" + file + "' approach '" + bag +
+                              "' --rate 30 --urdf '" PACKAGE_DIR "/urdf/puma560.urdf'";
+  ASSERT_EQ(std::system(command.c_str()), 0) << command;
+  const sim::World world = sim::readWorld(file);
+  StoredView view;
+  view.name = "goal";
+  view.image = sim::SimulatedCamera(world, {}, 77).capture(world.goal);
+  view.region = world.region;
+  ViewStore(viewsDir("homography_tracker")).save(view, true);
+  std::map<ros::Time, Eigen::Isometry3d> poses;
+  for (const Frame& frame : framesOf(bag))
+  {
+    poses[frame.stamp] = frame.pose;
+  }
+
+  const Recorder<Homography> homographies("homography");
+  const Recorder<geometry_msgs::TwistStamped> twists("cmd_vel_dry");
+  const Recorder<ServoError> errors("servo_error");
+  ASSERT_TRUE(waitForService("homography_tracker/start"));
+  ASSERT_TRUE(waitForService("point_matcher/match"));
+  ServoToViewGoal goal;
+  goal.view = "goal";
+  bool sent = false;
+  std::unique_ptr<actionlib::SimpleActionClient<ServoToViewAction>> client;
+  {
+    ChildProcess play({ "rosbag", "play", "--clock", "--quiet", "--rate=0.5", "--wait-for-subscribers", "--topics",
+                        "/camera/image_raw", "/camera/camera_info", "/tf", "/joint_states", "--bags=" + bag });
+    ASSERT_TRUE(waitUntil([] { return ros::Time::isValid(); }));  // a client waits for that without end
+    client = std::make_unique<actionlib::SimpleActionClient<ServoToViewAction>>("servo", false);
+    ASSERT_TRUE(waitUntil([&] { return client->isServerConnected(); }));
+    bool played = false;
+    for (int patience = 0; patience < 4 && !played; ++patience)
+    {
+      played = waitUntil([&] {
+        if (!sent || (client->getState().isDone() && client->getResult() && client->getResult()->iterations == 0))
+        {
+          client->sendGoal(goal);  // as soon as the camera is known
+          sent = true;
+        }
+        return play.exited();
+      });
+    }
+    ASSERT_TRUE(played);
+  }
+  // The bag ends at the view.
+  ASSERT_TRUE(client->getState().isDone()) << errors.messages().size() << " errors";
+  EXPECT_TRUE(client->getResult()->success) << client->getResult()->message;
+
+  const TrueView truth(world);
+  std::size_t answered = 0;
+  std::size_t right = 0;
+  bool found = false;
+  ros::Time first;
+  for (const Homography& message : homographies.messages())
+  {
+    const auto pose = poses.find(message.header.stamp);
+    ASSERT_NE(pose, poses.end()) << message.header.stamp;
+    if (!found && message.valid != 0)
+    {
+      found = true;
+      first = message.header.stamp;
+    }
+    if (found)
+    {
+      ++answered;
+      right += message.valid != 0 && truth.cornerError(toMatrix(message.h), pose->second) < TOLERANCE ? 1 : 0;
+    }
+  }
+  ASSERT_TRUE(found);
+  // At the view the goal ends, and the tracker with it.
+  const ros::Time last = homographies.last()->header.stamp;
+  const auto images = static_cast<double>(std::distance(poses.lower_bound(first), poses.upper_bound(last)));
+  RecordProperty("homographies", static_cast<int>(answered));
+  RecordProperty("right", static_cast<int>(right));
+  EXPECT_GE(static_cast<double>(answered), LEAST_ANSWERED * images);
+  EXPECT_GE(static_cast<double>(right), LEAST_SHARE * static_cast<double>(answered)) << right << " of " << answered;
+
+  std::size_t far_commands = 0;
+  std::size_t agreeing = 0;
+  double largest = 0.0;
+  for (const geometry_msgs::TwistStamped& message : twists.messages())
+  {
+    Twist twist;
+    twist << toVector(message.twist.linear), toVector(message.twist.angular);
+    const auto pose = poses.lower_bound(message.header.stamp);
+    if (twist.isZero() || message.header.stamp < first + ros::Duration(RAMP) || pose == poses.end() ||
+        (pose->second.translation() - world.goal.translation()).norm() < FAR)
+    {
+      continue;
+    }
+    Servo25d servo(truth.target(), Servo25dParams());
+    const double stamp = pose->first.toSec();
+    servo.add(truth.view(stamp, pose->second));
+    const Twist expected = relative(servo.command(stamp));
+    const double cosine = relative(twist).normalized().dot(expected.normalized());
+    const double angle = std::acos(std::clamp(cosine, -1.0, 1.0)) * 180.0 / M_PI;
+    largest = std::max(largest, angle);
+    ++far_commands;
+    agreeing += angle < LARGEST_ANGLE ? 1 : 0;
+  }
+  RecordProperty("far_commands", static_cast<int>(far_commands));
+  RecordProperty("largest_angle", static_cast<int>(largest));
+  EXPECT_GT(far_commands, 50u);
+  EXPECT_GE(static_cast<double>(agreeing), LEAST_SHARE * static_cast<double>(far_commands))
+      << agreeing << " of " << far_commands << ", the largest angle is " << largest;
+}
+
+}  // namespace
+}  // namespace test
+}  // namespace view_servo
+
+int main(int argc, char** argv)
+{
+  return view_servo::test::runTests(argc, argv, "arm_replay_test");
+}
