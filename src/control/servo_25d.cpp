@@ -71,6 +71,7 @@ std::vector<std::string> Servo25dParams::validate() const
   faults.require(translation_tolerance > 0.0, "translation_tolerance must be more than 0 m");
   faults.require(rotation_tolerance > 0.0, "rotation_tolerance must be more than 0 rad");
   faults.require(dwell >= 0.0, "dwell must not be negative");
+  faults.require(loss_tolerance >= 0.0 && loss_tolerance <= 0.5, "loss_tolerance must lie in [0, 0.5] s");
   faults.require(lost_timeout > 0.0, "lost_timeout must be more than 0 s");
   return faults.list();
 }
@@ -195,6 +196,10 @@ void Servo25d::addLoss(double stamp, const std::string& reason)
   lost_since_ = lost_since_.value_or(stamp);
   within_since_.reset();
   report_.inliers = 0;
+  if (view_ && stamp - view_->stamp <= params_.loss_tolerance)
+  {
+    return;
+  }
   if (stamp - *lost_since_ > params_.lost_timeout)
   {
     report_.state = ServoState::FAILED;

@@ -14,6 +14,7 @@ std::vector<Parameter> servoParameters(Servo25dParams& params, VelocityLimits& l
     real("translation_tolerance", params.translation_tolerance, "of being at the view [m], > 0"),
     real("rotation_tolerance", params.rotation_tolerance, "likewise [rad], > 0"),
     real("dwell", params.dwell, "time within the tolerances [s], >= 0"),
+    real("loss_tolerance", params.loss_tolerance, "without the view, bridged; then it stands [s], [0, 0.5]"),
     real("lost_timeout", params.lost_timeout, "without the view, after which it gives up [s], > 0"),
     real("max_speed", limits.max_speed, "of the camera [m/s], > 0"),
     real("max_turn_rate", limits.max_turn_rate, "[rad/s], > 0"),

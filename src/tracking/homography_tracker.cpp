@@ -171,17 +171,6 @@ std::optional<Eigen::Matrix3d> solveChange(const Matrix8& normal, const Vector8&
   return Eigen::Matrix3d(centring.inverse() * change * centring);
 }
 
-/** How far a homography moves points, in the mean [px]. */
-double meanWay(const Eigen::Matrix3d& h, const std::vector<Eigen::Vector2d>& points)
-{
-  double sum = 0.0;
-  for (const Eigen::Vector2d& point : points)
-  {
-    sum += (transfer(h, point) - point).norm();
-  }
-  return sum / static_cast<double>(points.size());
-}
-
 /** So that it matters less that interpolation smooths, the more so the further from whole pixels. */
 cv::Mat smoothed(const cv::Mat& image)
 {
@@ -315,7 +304,6 @@ std::vector<std::string> HomographyTrackerParams::validate() const
   faults.require(max_residual > 0.0, "max_residual must be more than 0 px");
   faults.require(min_supporting >= 5, "min_supporting must be at least 5");
   faults.require(min_support > 0.0 && min_support <= 1.0, "min_support must lie in (0, 1]");
-  faults.require(refine_within >= 0.0, "refine_within must not be negative");
   return faults.list();
 }
 
@@ -649,7 +637,7 @@ TrackedHomography HomographyTracker::track(const cv::Mat& current, const Eigen::
       result = other;
     }
   }
-  if (result.found && meanWay(result.h, points_) < params_.refine_within)
+  if (result.found && params_.refine)
   {
     result.h = normalizedHomography(refine(smoothed(current), result.h));
   }
@@ -661,9 +649,9 @@ TrackedHomography HomographyTracker::trackFrom(const std::vector<cv::Mat>& pyram
 {
   constexpr int COARSE_ITERATIONS = 5;
   constexpr int FINE_ITERATIONS = 2;
-  constexpr int FINE_ROUNDS = 3;
+  constexpr int FINE_ROUNDS = 2;
   // Widths of the fits, times max_residual: what hides a part still looks a little like it, a few pixels off.
-  constexpr std::array<double, FINE_ROUNDS> WIDTHS = { 2.0, 1.0, 0.5 };
+  constexpr std::array<double, FINE_ROUNDS> WIDTHS = { 2.0, 1.0 };
   TrackedHomography result;
   Eigen::Matrix3d h = predicted;
   bool verified = false;  // by RANSAC

@@ -182,8 +182,9 @@ TEST(Servo25dParams, NameAllFaultsAtOnce)
   params.translation_tolerance = 0.0;
   params.rotation_tolerance = -1.0;
   params.dwell = -0.1;
+  params.loss_tolerance = 0.6;
   params.lost_timeout = 0.0;
-  EXPECT_EQ(params.validate().size(), 8U);
+  EXPECT_EQ(params.validate().size(), 9U);
   EXPECT_THROW(Servo25d(target(), params), std::invalid_argument);
 }
 
@@ -236,9 +237,13 @@ TEST(Servo25d, StandsWhileTheViewIsLostAndGoesOnAfterwards)
     plant.step();
   }
   EXPECT_FALSE(plant.servo.command(plant.time()).isZero());
+  // An image or two are bridged.
   plant.servo.addLoss(plant.time(), "covered");
+  EXPECT_EQ(plant.servo.report().state, ServoState::SERVOING);
+  EXPECT_FALSE(plant.servo.command(plant.time()).isZero());
+  plant.servo.addLoss(plant.time() + 0.1, "covered");
   EXPECT_EQ(plant.servo.report().state, ServoState::LOST);
-  EXPECT_TRUE(plant.servo.command(plant.time()).isZero());
+  EXPECT_TRUE(plant.servo.command(plant.time() + 0.1).isZero());
   plant.servo.addLoss(plant.time() + 4.0, "covered");
   EXPECT_EQ(plant.servo.report().state, ServoState::LOST);
   plant.servo.add({ plant.time() + 4.1, plant.motion(), std::nullopt, 100 });

@@ -98,8 +98,7 @@ TEST(HomographyTrackerParams, NameAllFaultsAtOnce)
   params.max_residual = 0.0;
   params.min_supporting = 4;
   params.min_support = std::numeric_limits<double>::quiet_NaN();
-  params.refine_within = -1.0;
-  EXPECT_EQ(params.validate().size(), 8U);
+  EXPECT_EQ(params.validate().size(), 7U);
 }
 
 TEST(HomographyTracker, RefusesWhatItCanNotTrack)
@@ -195,7 +194,7 @@ TEST(HomographyTracker, IsNotMisledByWhatCoversAPart)
   }
 }
 
-/** Where the views nearly agree, all pixels tell more than the corners, whatever the light and what is hidden. */
+/** They tell more than the corners, whatever the light and what is hidden. */
 TEST(HomographyTracker, AllPixelsHaveTheLastWord)
 {
   constexpr int PLACES = 8;
@@ -206,7 +205,7 @@ TEST(HomographyTracker, AllPixelsHaveTheLastWord)
   const cv::Mat reference = camera.capture(world.goal);
   camera.setLight({ 0.7, 15.0, 0.4 });
   HomographyTrackerParams unrefined;
-  unrefined.refine_within = 0.0;
+  unrefined.refine = false;
   const HomographyTracker all_pixels(reference, world.region, HomographyTrackerParams());
   const HomographyTracker corners(reference, world.region, unrefined);
   const auto error = [&world](const Eigen::Matrix3d& h, const Eigen::Matrix3d& truth) {

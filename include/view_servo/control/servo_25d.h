@@ -26,6 +26,7 @@ struct Servo25dParams
   double translation_tolerance = 0.001;  ///< of being at the view [m], > 0
   double rotation_tolerance = 0.0015;    ///< likewise [rad], > 0
   double dwell = 0.5;                    ///< time within the tolerances [s], >= 0
+  double loss_tolerance = 0.12;          ///< without the view, bridged by what was sent; then it stands [s], [0, 0.5]
   double lost_timeout = 5.0;             ///< without the view, after which it gives up [s], > 0
 
   /** All faults, one a line; empty when the parameters are usable. */
@@ -110,7 +111,7 @@ public:
   /** An image in which the plane was found. Numbers that are not finite are a loss; an older image than the last is none. */
   void add(const PlaneView& view);
 
-  /** An image in which it was not. @param stamp of the image [s]. @param reason what there is to say of it. */
+  /** An image in which it was not; a few are bridged. @param stamp of the image [s]. @param reason what there is to say of it. */
   void addLoss(double stamp, const std::string& reason);
 
   /** What the camera was told to do from a time on [s]. */

@@ -23,7 +23,7 @@ struct HomographyTrackerParams
   double max_residual = 2.0;     ///< of a point that supports the homography [px], > 0
   int min_supporting = 15;       ///< points that make a homography, >= 5
   double min_support = 0.25;     ///< part of the points in sight that makes one, (0, 1]
-  double refine_within = 20.0;  ///< mean way of the points from the stored view below which all pixels count [px], >= 0
+  bool refine = true;            ///< all pixels of the region have the last word
 
   /** All faults, one a line; empty when the parameters are usable. */
   std::vector<std::string> validate() const;
@@ -47,8 +47,8 @@ struct TrackedHomography
  * both are normalised to zero mean and unit norm, so that gain and offset of the light do not matter. As in the thesis no
  * point is followed from image to image: each is found anew or not, and RANSAC on the coarsest level and robust fits below
  * it, which weigh each patch by what its texture tells, decide which are believed. Hidden patches correlate too little and
- * drop out. Where the views nearly agree, all pixels of the region have the last word, in blocks, of which those that differ
- * more than the others count less.
+ * drop out. All pixels of the region have the last word, in blocks, of which those that differ more than the others count
+ * less.
  *
  * Stateless but for what it knows of the stored view; the caller predicts, from odometry or from the motion before.
  */
