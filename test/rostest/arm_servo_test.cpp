@@ -1,6 +1,7 @@
 // Copyright (c) 2026, the view_servo authors
 // SPDX-License-Identifier: BSD-3-Clause
 #include "child_process.h"
+#include "commands.h"
 #include "node_test.h"
 #include "support/temporary_directory.h"
 
@@ -35,6 +36,7 @@ namespace test
 namespace
 {
 using Clock = std::chrono::steady_clock;
+using Commands = CommandsOf<geometry_msgs::TwistStamped>;
 using ActionClient = actionlib::SimpleActionClient<ServoToViewAction>;
 
 constexpr double STOPS_WITHIN = 0.3;  // of wall time, whatever fails [s]
@@ -166,73 +168,6 @@ private:
   ros::ServiceServer stop_;
   std::atomic<bool> running_{ true };
   std::thread thread_;
-};
-
-/** The commands of a topic, with when they came. */
-class Commands
-{
-public:
-  explicit Commands(const std::string& topic)
-  {
-    subscriber_ = ros::NodeHandle().subscribe<geometry_msgs::TwistStamped>(topic, 100, &Commands::take, this);
-  }
-
-  /** Whether the newest one moves the camera. */
-  bool moving() const
-  {
-    const std::lock_guard<std::mutex> lock(mutex_);
-    return !list_.empty() && list_.back().moves;
-  }
-  bool any() const
-  {
-    const std::lock_guard<std::mutex> lock(mutex_);
-    return !list_.empty();
-  }
-  /** When the last one came that moves the camera, since a moment [s]; negative: none did. */
-  double lastMotionAfter(Clock::time_point moment) const
-  {
-    const std::lock_guard<std::mutex> lock(mutex_);
-    for (auto command = list_.rbegin(); command != list_.rend(); ++command)
-    {
-      if (command->moves)
-      {
-        return std::chrono::duration<double>(command->time - moment).count();
-      }
-    }
-    return -1.0;
-  }
-  geometry_msgs::TwistStamped last() const
-  {
-    const std::lock_guard<std::mutex> lock(mutex_);
-    return list_.back().message;
-  }
-
-  /** Does not listen any more. */
-  void shutdown()
-  {
-    subscriber_.shutdown();
-    const std::lock_guard<std::mutex> lock(mutex_);
-    list_.clear();
-  }
-
-private:
-  struct Command
-  {
-    Clock::time_point time;
-    bool moves;
-    geometry_msgs::TwistStamped message;
-  };
-
-  void take(const geometry_msgs::TwistStamped::ConstPtr& message)
-  {
-    const bool moves = !toVector(message->twist.linear).isZero() || !toVector(message->twist.angular).isZero();
-    const std::lock_guard<std::mutex> lock(mutex_);
-    list_.push_back({ Clock::now(), moves, *message });
-  }
-
-  mutable std::mutex mutex_;
-  std::vector<Command> list_;
-  ros::Subscriber subscriber_;
 };
 
 class ArmServoTest : public ::testing::Test

@@ -1,6 +1,7 @@
 // Copyright (c) 2026, the view_servo authors
 // SPDX-License-Identifier: BSD-3-Clause
 #include "child_process.h"
+#include "commands.h"
 #include "node_test.h"
 #include "nodes/robot_messages.h"
 #include "sim/nomad.h"
@@ -41,6 +42,7 @@ namespace test
 namespace
 {
 using Clock = std::chrono::steady_clock;
+using Commands = CommandsOf<geometry_msgs::Twist>;
 using ActionClient = actionlib::SimpleActionClient<HomeToViewAction>;
 
 constexpr double STOPS_WITHIN = 0.3;  // of wall time, whatever fails [s]
@@ -153,65 +155,6 @@ private:
   tf2_ros::StaticTransformBroadcaster broadcaster_;
   std::atomic<bool> running_{ true };
   std::thread thread_;
-};
-
-/** The commands of a topic, with when they came. */
-class Commands
-{
-public:
-  explicit Commands(const std::string& topic)
-  {
-    subscriber_ = ros::NodeHandle().subscribe<geometry_msgs::Twist>(topic, 100, &Commands::take, this);
-  }
-
-  /** Whether the newest one moves the base. */
-  bool moving() const
-  {
-    const std::lock_guard<std::mutex> lock(mutex_);
-    return !list_.empty() && list_.back().moves;
-  }
-  bool any() const
-  {
-    const std::lock_guard<std::mutex> lock(mutex_);
-    return !list_.empty();
-  }
-  /** When the last one came that moves the base, since a moment [s]; negative: none did. */
-  double lastMotionAfter(Clock::time_point moment) const
-  {
-    const std::lock_guard<std::mutex> lock(mutex_);
-    for (auto command = list_.rbegin(); command != list_.rend(); ++command)
-    {
-      if (command->moves)
-      {
-        return std::chrono::duration<double>(command->time - moment).count();
-      }
-    }
-    return -1.0;
-  }
-  geometry_msgs::Twist last() const
-  {
-    const std::lock_guard<std::mutex> lock(mutex_);
-    return list_.back().twist;
-  }
-
-private:
-  struct Command
-  {
-    Clock::time_point time;
-    bool moves;
-    geometry_msgs::Twist twist;
-  };
-
-  void take(const geometry_msgs::Twist::ConstPtr& message)
-  {
-    const bool moves = message->linear.x != 0.0 || message->linear.y != 0.0 || message->angular.z != 0.0;
-    const std::lock_guard<std::mutex> lock(mutex_);
-    list_.push_back({ Clock::now(), moves, *message });
-  }
-
-  mutable std::mutex mutex_;
-  std::vector<Command> list_;
-  ros::Subscriber subscriber_;
 };
 
 class HomingTest : public ::testing::Test
