@@ -82,6 +82,11 @@ struct Params
   }
 };
 
+Eigen::Vector2d middleOf(const cv::Rect& rect)
+{
+  return { rect.x + 0.5 * (rect.width - 1), rect.y + 0.5 * (rect.height - 1) };
+}
+
 /** A view that is followed. Only the thread that follows uses what is not const. */
 struct Session
 {
@@ -101,6 +106,18 @@ struct Session
     tracker = std::make_unique<PlaneTracker>(reference, region, rectifier.k(), params);
     last_stamp = ros::Time();
     last_h.reset();
+    path.clear();
+  }
+
+  /** Where the middle of the region is now. */
+  void addToPath()
+  {
+    constexpr std::size_t LONGEST = 300;
+    path.push_back(transfer(*last_h, middleOf(region)));
+    if (path.size() > LONGEST)
+    {
+      path.erase(path.begin());
+    }
   }
 
   const std::string view;
@@ -111,6 +128,7 @@ struct Session
   std::unique_ptr<PlaneTracker> tracker;
   ros::Time last_stamp;
   std::optional<Eigen::Matrix3d> last_h;  // where the plane was tracked last
+  Points path;                            // of the region's middle, the point that servo_25d leads [px]
 };
 
 /** What the point matcher is asked for: where the view is in an image. */
@@ -146,7 +164,7 @@ std::array<Eigen::Vector2d, 4> movedCorners(const cv::Rect& rect, const Eigen::M
 /** Whether two homographies show a region in different places: their middles are apart by half its size. */
 bool isElsewhere(const cv::Rect& region, const Eigen::Matrix3d& h, const Eigen::Matrix3d& other)
 {
-  const Eigen::Vector2d centre(region.x + 0.5 * (region.width - 1), region.y + 0.5 * (region.height - 1));
+  const Eigen::Vector2d centre = middleOf(region);
   const std::array<Eigen::Vector2d, 4> corners = movedCorners(region, h);
   const double size = 0.5 * ((corners[2] - corners[0]).norm() + (corners[3] - corners[1]).norm());
   return !((transfer(h, centre) - transfer(other, centre)).norm() < 0.25 * size);
@@ -193,7 +211,7 @@ std::string nameOf(TrackingState state)
  * Publishes:
  *  - `homography` (view_servo/Homography): for each image, with its header. Pixels are those of the images as they come, or,
  *    when camera_info has distortion, of rectified ones, with P's K;
- *  - `overlay` (sensor_msgs/Image, bgr8): the view's outline and points; drawn when somebody listens;
+ *  - `overlay` (sensor_msgs/Image, bgr8): the view's outline and points, and the path of its middle; drawn when somebody listens;
  *  - `/diagnostics` (diagnostic_msgs/DiagnosticArray): 1 Hz, camera and tracking.
  *
  * Services:
@@ -428,6 +446,7 @@ private:
     if (track.state == TrackingState::TRACKING)
     {
       session.last_h = track.homography.h;
+      session.addToPath();
     }
     {
       const std::lock_guard<std::mutex> lock(mutex_);
@@ -524,6 +543,7 @@ private:
     view.region = session.region;
     view.h = track.homography.h;
     view.found = track.homography.points;
+    view.path = session.path;
     for (const Eigen::Vector2d& point : session.tracker->points())
     {
       if (std::find(view.found.begin(), view.found.end(), point) == view.found.end())

@@ -43,6 +43,7 @@ const cv::Scalar CANDIDATE_COLOUR(150, 150, 150);
 const cv::Scalar OUTLINE_COLOUR(80, 255, 255);
 const cv::Scalar FOUND_COLOUR(60, 220, 60);
 const cv::Scalar MISSING_COLOUR(60, 60, 240);
+const cv::Scalar PATH_COLOUR(240, 160, 60);
 
 /** Where an image lies in the picture. */
 struct Placement
@@ -151,20 +152,20 @@ Eigen::Matrix3d facingInliers(const ViewMatch& match)
   return behind ? Eigen::Matrix3d(-match.matrix) : match.matrix;
 }
 
-/** Draws a polygon of an image; parts with NaN or far outside are left out. */
-void drawOutline(const Points& polygon, Canvas canvas)
+/** Draws lines from point to point of an image; parts with NaN or far outside are left out. */
+void drawPolyline(const Points& points, const cv::Scalar& colour, int thickness, Canvas canvas)
 {
   const double far = 10.0 * MAX_WIDTH;
   const auto drawable = [&](const Eigen::Vector2d& point) {
     return point.allFinite() && point.cwiseAbs().maxCoeff() < far;
   };
-  for (std::size_t i = 0; i + 1 < polygon.size(); ++i)
+  for (std::size_t i = 0; i + 1 < points.size(); ++i)
   {
-    const Eigen::Vector2d from = canvas.place(polygon[i]);
-    const Eigen::Vector2d to = canvas.place(polygon[i + 1]);
+    const Eigen::Vector2d from = canvas.place(points[i]);
+    const Eigen::Vector2d to = canvas.place(points[i + 1]);
     if (drawable(from) && drawable(to))
     {
-      drawLine(canvas.area, from, to, OUTLINE_COLOUR, 2);
+      drawLine(canvas.area, from, to, colour, thickness);
     }
   }
 }
@@ -313,11 +314,11 @@ cv::Mat drawOverlay(const PreparedImage& reference, const PreparedImage& current
   if (match.outcome == MatchOutcome::MATCHED && match.model == GeometryModel::HOMOGRAPHY && match.planes.size() < 2)
   {
     Points polygon = outline(reference.region());
-    drawOutline(polygon, { left, picture });
+    drawPolyline(polygon, OUTLINE_COLOUR, 2, { left, picture });
     const Eigen::Matrix3d h = facingInliers(match);
     std::transform(polygon.begin(), polygon.end(), polygon.begin(),
                    [&](const Eigen::Vector2d& point) { return transfer(h, point); });
-    drawOutline(polygon, { right, picture });
+    drawPolyline(polygon, OUTLINE_COLOUR, 2, { right, picture });
   }
   writeCaption(caption(match), picture.rowRange(images.height, picture.rows));
   return picture;
@@ -332,6 +333,7 @@ cv::Mat drawFollowedView(const cv::Mat& current, const FollowedView& view)
   cv::Mat picture(size.height + CAPTION_HEIGHT, size.width, CV_8UC3, BACKGROUND);
   drawImage(current, place, picture);
   Canvas canvas(place, picture);
+  drawPolyline(view.path, PATH_COLOUR, 1, canvas);
   if (view.h.allFinite())
   {
     const auto draw = [&](const Points& points, const cv::Scalar& colour) {
@@ -349,7 +351,7 @@ cv::Mat drawFollowedView(const cv::Mat& current, const FollowedView& view)
     Points polygon = outline(view.region);
     std::transform(polygon.begin(), polygon.end(), polygon.begin(),
                    [&](const Eigen::Vector2d& point) { return transfer(view.h, point); });
-    drawOutline(polygon, canvas);
+    drawPolyline(polygon, OUTLINE_COLOUR, 2, canvas);
   }
   writeCaption(view.text, picture.rowRange(size.height, picture.rows));
   return picture;

@@ -292,6 +292,10 @@ TEST(FollowedView, ShowsOutlinePointsAndText)
   EXPECT_GT(found[1], found[2]);
   EXPECT_GT(missing[2], missing[1]);
 
+  view.path = { { 300.0, 150.0 }, { 340.0, 150.0 } };
+  EXPECT_GT(colouredPixels(view_servo::drawFollowedView(current, view), around(320, 150)), 3);
+  view.path.clear();
+
   view.h.setConstant(std::numeric_limits<double>::quiet_NaN());
   const cv::Mat lost = view_servo::drawFollowedView(current, view);
   EXPECT_EQ(colouredPixels(lost, cv::Rect(0, 0, 450, 200)), 0);

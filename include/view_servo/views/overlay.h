@@ -29,10 +29,11 @@ struct FollowedView
   Eigen::Matrix3d h;  ///< x_cur ~ H x_ref; NaN: not found
   Points found;       ///< points of the stored view that were found [px]
   Points missing;     ///< those that were not [px]
+  Points path;        ///< where its chosen point has been, in current pixels, newest last
   std::string text;   ///< one line
 };
 
-/** A picture of it, BGR: the outline of the region, found points green, missing ones red, the text below. */
+/** A picture of it, BGR: the outline of the region, found points green, missing ones red, the path, the text below. */
 cv::Mat drawFollowedView(const cv::Mat& current, const FollowedView& view);
 
 }  // namespace view_servo
