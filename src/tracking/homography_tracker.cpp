@@ -405,8 +405,23 @@ void HomographyTracker::makeBlocks(const cv::Mat& image, const cv::Rect& region)
 Eigen::Matrix3d HomographyTracker::refine(const cv::Mat& current, const Eigen::Matrix3d& h) const
 {
   constexpr int ITERATIONS = 2;
-  constexpr double WIDTH = 3.0;       // of the weights, in median deviations
+  constexpr double WIDTH = 3.0;      // of the weights, in median deviations
+  constexpr double CONVERGED = 0.1;  // of a corner of the region [px]: the next step would hardly move it
+  constexpr int SIDE = 2 * BLOCK_RADIUS + 1;
+  using Row = Eigen::Array<float, SIDE, 1>;
   constexpr std::size_t FEWEST = 12;  // blocks
+  const auto largestShift = [this](const Eigen::Matrix3d& change) {
+    double largest = 0.0;
+    for (const double u : { -1.0, 1.0 })
+    {
+      for (const double v : { -1.0, 1.0 })
+      {
+        const Eigen::Vector2d corner = centring_.middle + centring_.spread * Eigen::Vector2d(u, v);
+        largest = std::max(largest, (transfer(change, corner) - corner).norm());
+      }
+    }
+    return largest;
+  };
   struct Seen
   {
     const Block* block;
@@ -414,7 +429,9 @@ Eigen::Matrix3d HomographyTracker::refine(const cv::Mat& current, const Eigen::M
     Vector8 right;
   };
   Eigen::Matrix3d refined = h;
-  std::vector<float> values(static_cast<std::size_t>((2 * BLOCK_RADIUS + 1) * (2 * BLOCK_RADIUS + 1)));
+  std::vector<float> values(static_cast<std::size_t>(SIDE * SIDE));
+  const float per_spread = static_cast<float>(1.0 / centring_.spread);
+  const Row offsets = Row::LinSpaced(SIDE, -static_cast<float>(BLOCK_RADIUS), static_cast<float>(BLOCK_RADIUS));
   for (int iteration = 0; iteration < ITERATIONS; ++iteration)
   {
     std::vector<Seen> all;
@@ -430,30 +447,33 @@ Eigen::Matrix3d HomographyTracker::refine(const cv::Mat& current, const Eigen::M
       {
         continue;
       }
-      // Sums of the gradients times the differences, times 1, x, y, and of both along the way from the middle.
+      // Of the gradients times the differences, sums along the rows: of them, times x, and times x².
       float squares = 0.0F;
       Eigen::Matrix<float, 8, 1> right = Eigen::Matrix<float, 8, 1>::Zero();
-      std::size_t i = 0;
-      for (int dv = -BLOCK_RADIUS; dv <= BLOCK_RADIUS; ++dv)
+      const Row x = (static_cast<float>(block.at.x() - centring_.middle.x()) + offsets) * per_spread;
+      for (int row = 0; row < SIDE; ++row)
       {
-        const float y = static_cast<float>((block.at.y() + dv - centring_.middle.y()) / centring_.spread);
-        for (int du = -BLOCK_RADIUS; du <= BLOCK_RADIUS; ++du, ++i)
-        {
-          const float x = static_cast<float>((block.at.x() + du - centring_.middle.x()) / centring_.spread);
-          const float difference = values[i] - block.values[i];
-          const float along_u = difference * block.gradient_u[i];
-          const float along_v = difference * block.gradient_v[i];
-          const float outward = -(x * along_u + y * along_v);
-          squares += difference * difference;
-          right(0) += x * along_u;
-          right(1) += y * along_u;
-          right(2) += along_u;
-          right(3) += x * along_v;
-          right(4) += y * along_v;
-          right(5) += along_v;
-          right(6) += x * outward;
-          right(7) += y * outward;
-        }
+        const float y = static_cast<float>(block.at.y() + row - BLOCK_RADIUS - centring_.middle.y()) * per_spread;
+        const std::ptrdiff_t first = static_cast<std::ptrdiff_t>(row) * SIDE;
+        const auto rowOf = [first](const std::vector<float>& numbers) {
+          return Eigen::Map<const Row>(numbers.data() + first);
+        };
+        const Row difference = rowOf(values) - rowOf(block.values);
+        const Row along_u = difference * rowOf(block.gradient_u);
+        const Row along_v = difference * rowOf(block.gradient_v);
+        const float u = along_u.sum();
+        const float v = along_v.sum();
+        const float xu = (x * along_u).sum();
+        const float xv = (x * along_v).sum();
+        squares += difference.square().sum();
+        right(0) += xu;
+        right(1) += y * u;
+        right(2) += u;
+        right(3) += xv;
+        right(4) += y * v;
+        right(5) += v;
+        right(6) -= (x.square() * along_u).sum() + y * xv;
+        right(7) -= y * (xu + y * v);
       }
       if (!(1.0F - 0.5F * squares >= static_cast<float>(params_.min_correlation)))
       {
@@ -485,6 +505,10 @@ Eigen::Matrix3d HomographyTracker::refine(const cv::Mat& current, const Eigen::M
       return refined;
     }
     refined = refined * left->inverse();
+    if (largestShift(*left) < CONVERGED)
+    {
+      return refined;
+    }
   }
   return refined;
 }
