@@ -18,6 +18,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <limits>
 #include <optional>
 #include <stdexcept>
 #include <utility>
@@ -406,7 +407,8 @@ Eigen::Matrix3d HomographyTracker::refine(const cv::Mat& current, const Eigen::M
 {
   constexpr int ITERATIONS = 2;
   constexpr double WIDTH = 3.0;      // of the weights, in median deviations
-  constexpr double CONVERGED = 0.1;  // of a corner of the region [px]: the next step would hardly move it
+  constexpr double FARTHEST = 10.0;  // that a step is believed, of a corner of the region [px]
+  constexpr double CONVERGED = 0.1;  // likewise: the next step would hardly move it
   constexpr int SIDE = 2 * BLOCK_RADIUS + 1;
   using Row = Eigen::Array<float, SIDE, 1>;
   constexpr std::size_t FEWEST = 12;  // blocks
@@ -500,12 +502,13 @@ Eigen::Matrix3d HomographyTracker::refine(const cv::Mat& current, const Eigen::M
       right += weight * seen.right;
     }
     const std::optional<Eigen::Matrix3d> left = solveChange(normal, right, centring_.middle, centring_.spread);
-    if (!left)
+    const double shift = left ? largestShift(*left) : std::numeric_limits<double>::infinity();
+    if (!(shift < FARTHEST))
     {
-      return refined;
+      return h;
     }
     refined = refined * left->inverse();
-    if (largestShift(*left) < CONVERGED)
+    if (shift < CONVERGED)
     {
       return refined;
     }
