@@ -33,6 +33,7 @@
 #include <condition_variable>
 #include <cstdint>
 #include <filesystem>
+#include <functional>
 #include <limits>
 #include <map>
 #include <memory>
@@ -463,16 +464,17 @@ private:
         throw std::invalid_argument("tolerances, dwell and timeout must be finite and not negative");
       }
     }
-    if (!heard())
+    if (!soon([this] { return heard(); }))
     {
       throw std::runtime_error("nobody listens on '" + command_publisher_.getTopic() + "'");
     }
     sensor_msgs::CameraInfo::ConstPtr info;
-    {
+    const auto has_come = [&] {
       const std::lock_guard<std::mutex> lock(mutex_);
       info = info_;
-    }
-    if (!info)
+      return info != nullptr;
+    };
+    if (!soon(has_come))
     {
       throw std::runtime_error("no camera_info has come on '" + info_subscriber_.getTopic() + "'");
     }
@@ -506,6 +508,21 @@ private:
     set(goal.timeout, session->timeout);
     startTracker(stored.name);
     return session;
+  }
+
+  /** Whether something holds, or comes to within a while: just after a launch, connections take a moment. */
+  static bool soon(const std::function<bool()>& holds)
+  {
+    const ros::WallTime deadline = ros::WallTime::now() + ros::WallDuration(2.0);
+    while (!holds())
+    {
+      if (ros::WallTime::now() >= deadline)
+      {
+        return false;
+      }
+      ros::WallDuration(0.02).sleep();
+    }
+    return true;
   }
 
   /** Whether somebody follows commands, or nobody needs to. */
