@@ -412,7 +412,7 @@ Eigen::Matrix3d HomographyTracker::refine(const cv::Mat& current, const Eigen::M
   constexpr int SIDE = 2 * BLOCK_RADIUS + 1;
   using Row = Eigen::Array<float, SIDE, 1>;
   constexpr std::size_t FEWEST = 12;  // blocks
-  const auto largestShift = [this](const Eigen::Matrix3d& change) {
+  const auto largest_shift = [this](const Eigen::Matrix3d& change) {
     double largest = 0.0;
     for (const double u : { -1.0, 1.0 })
     {
@@ -457,12 +457,12 @@ Eigen::Matrix3d HomographyTracker::refine(const cv::Mat& current, const Eigen::M
       {
         const float y = static_cast<float>(block.at.y() + row - BLOCK_RADIUS - centring_.middle.y()) * per_spread;
         const std::ptrdiff_t first = static_cast<std::ptrdiff_t>(row) * SIDE;
-        const auto rowOf = [first](const std::vector<float>& numbers) {
+        const auto row_of = [first](const std::vector<float>& numbers) {
           return Eigen::Map<const Row>(numbers.data() + first);
         };
-        const Row difference = rowOf(values) - rowOf(block.values);
-        const Row along_u = difference * rowOf(block.gradient_u);
-        const Row along_v = difference * rowOf(block.gradient_v);
+        const Row difference = row_of(values) - row_of(block.values);
+        const Row along_u = difference * row_of(block.gradient_u);
+        const Row along_v = difference * row_of(block.gradient_v);
         const float u = along_u.sum();
         const float v = along_v.sum();
         const float xu = (x * along_u).sum();
@@ -502,7 +502,7 @@ Eigen::Matrix3d HomographyTracker::refine(const cv::Mat& current, const Eigen::M
       right += weight * seen.right;
     }
     const std::optional<Eigen::Matrix3d> left = solveChange(normal, right, centring_.middle, centring_.spread);
-    const double shift = left ? largestShift(*left) : std::numeric_limits<double>::infinity();
+    const double shift = left ? largest_shift(*left) : std::numeric_limits<double>::infinity();
     if (!(shift < FARTHEST))
     {
       return h;

@@ -16,10 +16,10 @@ namespace view_servo::test
 {
 inline bool moves(const geometry_msgs::Twist& twist)
 {
-  const auto isZero = [](const geometry_msgs::Vector3& v) {
+  const auto is_zero = [](const geometry_msgs::Vector3& v) {
     return v.x == 0.0 && v.y == 0.0 && v.z == 0.0;
   };
-  return !isZero(twist.linear) || !isZero(twist.angular);
+  return !is_zero(twist.linear) || !is_zero(twist.angular);
 }
 
 inline bool moves(const geometry_msgs::TwistStamped& message)
