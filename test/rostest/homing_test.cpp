@@ -283,7 +283,7 @@ TEST_F(HomingTest, DrivesTowardsTheView)
   EXPECT_NEAR(std::atan2(twist.linear.y, twist.linear.x), truth.heading(), 0.05);
   EXPECT_LT(twist.angular.z, 0.0);
   EXPECT_LE(std::hypot(twist.linear.x, twist.linear.y), 0.25 + 1e-9);
-  EXPECT_EQ(status_.last()->state, ServoStatus::SERVOING);
+  EXPECT_TRUE(waitUntil([this] { return status_.last()->state == ServoStatus::SERVOING; }));
 }
 
 TEST_F(HomingTest, StopsWhenTheCameraStopsAndGoesOnWithIt)
