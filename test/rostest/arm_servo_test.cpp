@@ -309,7 +309,7 @@ TEST_F(ArmServoTest, DrivesTowardsTheView)
   EXPECT_NEAR(error.error_x, 0.2, 1e-6);
   EXPECT_NEAR(error.translation_error, 0.1, 1e-6);
   EXPECT_NEAR(error.rotation_error, 0.0, 1e-6);
-  EXPECT_EQ(status_.last()->state, ServoStatus::SERVOING);
+  EXPECT_TRUE(waitUntil([this] { return status_.last()->state == ServoStatus::SERVOING; }));
   EXPECT_EQ(status_.last()->inliers, 50);
 }
 
