@@ -14,7 +14,7 @@
  * - odometry: the tracker, predicted by the true motion with noise of 1 %;
  * - alone: the tracker from the last homography;
  * - KLT: the stored view warped by the last homography, Lucas-Kanade flow of 200 points against it, RANSAC, twice;
- * - ViSP SSD: ViSP's inverse compositional template tracker from the last homography, where ViSP is installed.
+ * - ViSP SSD: ViSP's inverse compositional template tracker from the last homography.
  * ecc: the same sequences with cv::findTransformECC from the last homography, which takes minutes.
  * hardships, what a tracker has to bear: 40 % of the plane covered by something that moves, and jumps of 150 px that
  * odometry tells of.
