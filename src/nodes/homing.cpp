@@ -494,9 +494,10 @@ private:
     inputs_missing_since_.reset();
   }
 
-  /** Ends the goal. The control mutex is held. */
+  /** Stops, then ends the goal and publishes why. The control mutex is held. */
   void finish(bool success, const std::string& reason)
   {
+    rest();
     HomeToViewResult result;
     std::uint8_t state = success ? ServoStatus::CONVERGED : ServoStatus::ABORTED;
     ServoStatus status;
@@ -514,8 +515,6 @@ private:
       status = toStatus(state, reason, report_);
       session_.reset();
     }
-    wanted_.setZero();
-    limiter_.stop();
     status_.publish(status);
     if (success)
     {

@@ -568,16 +568,19 @@ private:
     }
   }
 
-  /** Ends the goal and stands still. The mutex is held. */
+  /** Ends the goal without success. The mutex is held. */
   void end(const std::string& reason)
   {
     finish(false, reason);
-    rest();
   }
 
-  /** Ends the goal. The mutex is held. */
-  void finish(bool success, const std::string& reason)
+  /**
+   * Stops, then ends the goal and publishes why. The reason is a copy: it may be part of the session, which ends here. The
+   * mutex is held.
+   */
+  void finish(bool success, const std::string reason)  // NOLINT(performance-unnecessary-value-param)
   {
+    rest();
     ServoToViewResult result;
     result.success = success ? 1 : 0;
     result.message = reason;
@@ -586,7 +589,6 @@ private:
     const auto state = success ? ServoStatus::CONVERGED : gate_.open() ? ServoStatus::ABORTED : ServoStatus::DISABLED;
     result.final = toStatus(state, reason);
     session_.reset();
-    limiter_.stop();
     status_.publish(result.final);
     {
       const std::lock_guard<std::mutex> lock(goal_mutex_);
@@ -636,7 +638,6 @@ private:
     else if (report.state == ServoState::CONVERGED)
     {
       finish(true, report.reason);
-      rest();
     }
     else if (report.state == ServoState::FAILED)
     {
