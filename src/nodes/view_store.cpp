@@ -140,7 +140,7 @@ private:
   {
     const StoredView view = store_.load(request.name);
     std_msgs::Header header;
-    header.stamp.fromSec(view.stamp);
+    header.stamp = toStamp(view.stamp);
     header.frame_id = view.frame_id;
     response.image = toImage(view.image, sensor_msgs::image_encodings::MONO8, header);
     response.camera_info = toCameraInfo(view.camera.value_or(Camera()), header);

@@ -65,8 +65,8 @@ CameraFrame CameraInput::latest() const
   {
     throw ImageError("no image from the camera: " + (problem_.empty() ? "none came on " + topics() : problem_));
   }
-  const double age = (ros::Time::now() - latest_.image->header.stamp).toSec();
-  if (std::abs(age) > params_.max_image_age)
+  const double age = ageOf(latest_.image->header.stamp);
+  if (!(std::abs(age) <= params_.max_image_age))
   {
     throw ImageError("the latest camera image on '" + image_subscriber_.getTopic() + "' is " +
                      (age > 0.0 ? seconds(age) + " old" : "stamped " + seconds(-age) + " in the future") +
@@ -102,6 +102,11 @@ void CameraInput::diagnose(diagnostic_updater::DiagnosticStatusWrapper& status)
 }
 
 void CameraInput::frameCallback(const sensor_msgs::ImageConstPtr& image, const sensor_msgs::CameraInfoConstPtr& info)
+{
+  guarded("an image on '" + imageTopic() + "'", [&] { take(image, info); });
+}
+
+void CameraInput::take(const sensor_msgs::ImageConstPtr& image, const sensor_msgs::CameraInfoConstPtr& info)
 {
   std::string problem;
   if (!isCalibrated(*info))

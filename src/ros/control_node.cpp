@@ -92,9 +92,9 @@ bool isOutdated(const ServoStatus& last, const CommandGate& gate)
 
 std::string timeJump(ros::Time& last, const ros::Time& stamp, const std::string& what)
 {
-  const ros::Duration tolerance(0.5);
-  const ros::Time before = std::exchange(last, stamp);
-  return stamp + tolerance < before ? "time has gone back by " + seconds((before - stamp).toSec()) + " in " + what : "";
+  constexpr double TOLERANCE = 0.5;  // [s]
+  const double back = secondsBetween(stamp, std::exchange(last, stamp));
+  return back > TOLERANCE ? "time has gone back by " + seconds(back) + " in " + what : "";
 }
 
 void detail::deferShutdown()

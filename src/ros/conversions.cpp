@@ -10,6 +10,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <cstdint>
 #include <limits>
 
@@ -43,6 +44,12 @@ bool needsReordering(const std::string& encoding)
 }
 
 }  // namespace
+
+ros::Time toStamp(double seconds)
+{
+  constexpr double LARGEST = 4294967295.0;  // that a stamp holds [s]
+  return ros::Time(std::isfinite(seconds) ? std::clamp(seconds, 0.0, LARGEST) : 0.0);
+}
 
 bool isCalibrated(const sensor_msgs::CameraInfo& info)
 {

@@ -90,7 +90,7 @@ SourcedImage ImageSourceReader::read(const ImageSource& source, const std::strin
       const StoredView view = store_.load(source.view);
       result.grey = view.image;
       result.region = view.region;
-      result.header.stamp.fromSec(view.stamp);
+      result.header.stamp = toStamp(view.stamp);
       result.header.frame_id = view.frame_id;
       result.camera = view.camera;
       result.pose = view.pose;

@@ -16,8 +16,7 @@ NodeBase::NodeBase(const ros::NodeHandle& nh, const ros::NodeHandle& private_nh)
   : nh_(nh), private_nh_(private_nh), diagnostics_(nh, private_nh)
 {
   diagnostics_.setHardwareID("none");
-  diagnostics_timer_ =
-      nh_.createWallTimer(ros::WallDuration(1.0), [this](const ros::WallTimerEvent&) { diagnostics_.force_update(); });
+  diagnostics_timer_ = every(1.0, "diagnostics", [this] { diagnostics_.force_update(); });
 }
 
 std::string oneLine(const std::exception& error)
@@ -37,6 +36,16 @@ std::string seconds(double value)
   text.precision(3);
   text << value << " s";
   return text.str();
+}
+
+double secondsBetween(const ros::Time& from, const ros::Time& to)
+{
+  return to.toSec() - from.toSec();
+}
+
+double ageOf(const ros::Time& stamp)
+{
+  return secondsBetween(stamp, ros::Time::now());
 }
 
 void keepFreedMemory()

@@ -16,6 +16,7 @@
 #include <geometry_msgs/Transform.h>
 #include <geometry_msgs/TransformStamped.h>
 #include <geometry_msgs/Vector3.h>
+#include <ros/time.h>
 #include <sensor_msgs/CameraInfo.h>
 #include <sensor_msgs/Image.h>
 #include <sensor_msgs/RegionOfInterest.h>
@@ -32,6 +33,9 @@ namespace view_servo
 /** @file
  * Between the core's types and messages. All of them are values: nothing refers to its source afterwards.
  */
+
+/** A time [s] as a stamp; what no stamp can hold becomes the nearest that one can, what is not finite 0. */
+ros::Time toStamp(double seconds);
 
 /** Whether K says anything: REP 104 has an uncalibrated camera send it all zero. */
 bool isCalibrated(const sensor_msgs::CameraInfo& info);

@@ -8,8 +8,12 @@
 #include <ros/node_handle.h>
 #include <ros/service_server.h>
 #include <ros/spinner.h>
+#include <ros/subscriber.h>
+#include <ros/time.h>
+#include <ros/transport_hints.h>
 #include <ros/wall_timer.h>
 #include <boost/function.hpp>
+#include <boost/shared_ptr.hpp>
 
 #include <cstdint>
 #include <exception>
@@ -22,6 +26,39 @@ std::string oneLine(const std::exception& error);
 
 /** A time [s] for people. */
 std::string seconds(double value);
+
+/** Time from one stamp to another [s]. Never throws, as the difference of two ros::Time does beyond 68 years. */
+double secondsBetween(const ros::Time& from, const ros::Time& to);
+
+/** Age of a stamp by ROS' clock [s]; negative when it lies in the future. */
+double ageOf(const ros::Time& stamp);
+
+/**
+ * Runs what ROS calls, so that no message, timer or thread ends the node.
+ * @param what is run, for the log.
+ * @return the text of what was thrown, in one line; empty when nothing was.
+ */
+template <typename Body>
+std::string guarded(const std::string& what, const Body& body)
+{
+  std::string fault;
+  try
+  {
+    body();
+    return fault;
+  }
+  catch (const std::exception& error)
+  {
+    fault = oneLine(error);
+  }
+  catch (...)
+  {
+    fault = "unknown exception";
+  }
+  fault = fault.empty() ? "exception without a text" : fault;
+  ROS_ERROR_STREAM_THROTTLE(5.0, what << " failed: " << fault);
+  return fault;
+}
 
 /**
  * Lets the process keep the memory that it has freed. Images come and go with every cycle; to ask the system for them
@@ -61,9 +98,35 @@ protected:
         response.message = oneLine(error);
         ROS_WARN_STREAM(response.message);
       }
+      catch (...)
+      {
+        response.success = false;
+        response.message = "unknown exception";
+        ROS_WARN_STREAM(response.message);
+      }
       return true;
     };
     return private_nh_.advertiseService(name, callback);
+  }
+
+  /** Subscribes; what `handler` throws is logged. @param handler is called with a const Message::ConstPtr&. */
+  template <typename Message, typename Handler>
+  ros::Subscriber subscribe(const std::string& topic, std::uint32_t queue_size, Handler handler,
+                            const ros::TransportHints& hints = ros::TransportHints())
+  {
+    using Pointer = boost::shared_ptr<const Message>;
+    const boost::function<void(const Pointer&)> callback = [topic, handler](const Pointer& message) {
+      guarded("a message on '" + topic + "'", [&] { handler(message); });
+    };
+    return nh_.subscribe<Message>(topic, queue_size, callback, ros::VoidConstPtr(), hints);
+  }
+
+  /** Calls `body` every `period` [s] of wall time; what it throws is logged. */
+  template <typename Body>
+  ros::WallTimer every(double period, const std::string& what, Body body)
+  {
+    return nh_.createWallTimer(ros::WallDuration(period),
+                               [what, body](const ros::WallTimerEvent&) { guarded(what, body); });
   }
 
   ros::NodeHandle nh_;

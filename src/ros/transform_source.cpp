@@ -1,0 +1,55 @@
+// Copyright (c) 2026, the view_servo authors
+// SPDX-License-Identifier: BSD-3-Clause
+#include "view_servo/ros/transform_source.h"
+
+#include "view_servo/ros/node_base.h"
+#include "view_servo/ros/readiness.h"
+
+#include <tf2/exceptions.h>
+
+#include <stdexcept>
+
+namespace view_servo
+{
+TransformSource::TransformSource() : listener_(buffer_)
+{
+}
+
+std::string TransformSource::missing(const std::string& target, const std::string& source, const ros::Time& stamp) const
+{
+  std::string error;
+  try
+  {
+    if (buffer_.canTransform(target, source, stamp, &error))
+    {
+      return "";
+    }
+  }
+  catch (const std::exception& exception)
+  {
+    error = oneLine(exception);
+  }
+  return "tf does not know the frame '" + source + "' in '" + target + "'" + (error.empty() ? "" : ": " + error);
+}
+
+geometry_msgs::TransformStamped TransformSource::lookUp(const std::string& target, const std::string& source,
+                                                        const ros::Time& stamp, double patience,
+                                                        const std::function<bool()>& given_up) const
+{
+  const std::string lacking = waitUntilReady(
+      patience, [&] { return missing(target, source, stamp); }, given_up);
+  if (!lacking.empty())
+  {
+    throw std::runtime_error(lacking);
+  }
+  try
+  {
+    return buffer_.lookupTransform(target, source, stamp);
+  }
+  catch (const tf2::TransformException& exception)
+  {
+    throw std::runtime_error("tf does not know the frame '" + source + "' in '" + target + "': " + oneLine(exception));
+  }
+}
+
+}  // namespace view_servo
