@@ -28,29 +28,30 @@ public:
   {
   }
 
-  BaseVelocity command() override
+  Course course() const override
   {
-    const std::optional<PlanarPose> base = odometry_.newest();
-    if (!base || !moving_ || ended())
+    Course course;
+    if (moving_ && !ended())
     {
-      return BaseVelocity::Zero();
+      course.kind = Course::STEP;
+      course.start = step_start_;
+      course.heading = step_heading_;
+      course.length = step_length_;
+      course.speed = params_.step_speed;
     }
-    const PlanarPose done = compose(inverse(step_start_), *base);
-    const double left = step_length_ - done.distance();
-    if (left <= 0.0)
-    {
-      moving_ = false;
-      step_end_known_ = false;
-      return BaseVelocity::Zero();
-    }
-    // The step's direction is that of the pose where it began; slower towards its end.
-    constexpr double SLOWING = 4.0;  // [1/s]
-    const double speed = std::min(params_.step_speed, SLOWING * left + 0.01);
-    const double direction = step_heading_ - done.yaw;
-    return { speed * std::cos(direction), speed * std::sin(direction), 0.0 };
+    return course;
   }
 
 protected:
+  void takeOdometry(const PlanarPose& base_in_odom) override
+  {
+    if (moving_ && compose(inverse(step_start_), base_in_odom).distance() >= step_length_)
+    {
+      moving_ = false;
+      step_end_known_ = false;
+    }
+  }
+
   void takeMatches(double stamp, const HeadingEvidence& evidence, const PlanarPose& /*camera_in_odom*/) override
   {
     if (moving_ || ended() || !step_end_known_ || stamp < step_end_ || !(similarity_stamp_ >= step_end_))
@@ -147,23 +148,24 @@ public:
   {
   }
 
-  BaseVelocity command() override
+  Course course() const override
   {
-    const std::optional<PlanarPose> base = odometry_.newest();
-    if (!base || !view_in_odom_ || ended() || report_.state == HomingState::LOST ||
-        report_.state == HomingState::ACQUIRING)
+    Course course;
+    if (!view_in_odom_ || ended() || report_.state == HomingState::LOST || report_.state == HomingState::ACQUIRING)
     {
-      return BaseVelocity::Zero();
+      return course;
     }
-    const PlanarPose goal = goalInBase(*base);
-    double speed = params_.gain * goal.distance();
+    course.kind = Course::TO_VIEW;
+    course.view = compose(*view_in_odom_, inverse(target_.mount.on_base));
+    course.gain = params_.gain;
+    course.turn_gain = params_.turn_gain;
     if (blind_)
     {
-      // Matches alone tell no distance.
-      speed = tracker_.hasStructure() ? std::min(speed, params_.blind_speed) : params_.blind_speed;
+      // Matches alone do not say how far it is.
+      course.max_speed = params_.blind_speed;
+      course.min_speed = tracker_.hasStructure() ? 0.0 : params_.blind_speed;
     }
-    const double heading = goal.heading();
-    return { speed * std::cos(heading), speed * std::sin(heading), params_.turn_gain * goal.yaw };
+    return course;
   }
 
 protected:
@@ -430,6 +432,24 @@ private:
 };
 
 }  // namespace
+
+Progress toProgress(const HomingReport& report)
+{
+  const std::string reason = report.reason.empty() ? "no image has been worked on yet" : report.reason;
+  switch (report.state)
+  {
+    case HomingState::ACQUIRING:
+      return { Progress::ACQUIRING, reason };
+    case HomingState::LOST:
+      return { Progress::LOST, reason };
+    case HomingState::ARRIVED:
+      return { Progress::ARRIVED, reason };
+    case HomingState::FAILED:
+      return { Progress::FAILED, reason };
+    default:
+      return { Progress::DRIVING, reason };
+  }
+}
 
 std::vector<std::string> HomingParams::validate() const
 {

@@ -61,19 +61,21 @@ std::string describe(double translation, double rotation)
 
 }  // namespace
 
-std::vector<std::string> Servo25dParams::validate() const
+Progress toProgress(const ServoReport& report)
 {
-  Faults faults;
-  faults.require(gain > 0.0, "gain must be more than 0 1/s");
-  faults.require(near_gain >= gain, "near_gain must be at least gain");
-  faults.require(margin >= 0.0 && margin <= 0.3, "margin must lie in [0, 0.3]");
-  faults.require(distance > 0.0, "distance must be more than 0 m");
-  faults.require(translation_tolerance > 0.0, "translation_tolerance must be more than 0 m");
-  faults.require(rotation_tolerance > 0.0, "rotation_tolerance must be more than 0 rad");
-  faults.require(dwell >= 0.0, "dwell must not be negative");
-  faults.require(loss_tolerance >= 0.0 && loss_tolerance <= 0.5, "loss_tolerance must lie in [0, 0.5] s");
-  faults.require(lost_timeout > 0.0, "lost_timeout must be more than 0 s");
-  return faults.list();
+  switch (report.state)
+  {
+    case ServoState::ACQUIRING:
+      return { Progress::ACQUIRING, report.reason };
+    case ServoState::SERVOING:
+      return { Progress::DRIVING, "drives to the view" };
+    case ServoState::LOST:
+      return { Progress::LOST, report.reason };
+    case ServoState::CONVERGED:
+      return { Progress::ARRIVED, report.reason };
+    default:
+      return { Progress::FAILED, report.reason };
+  }
 }
 
 Servo25dError servo25dError(const EuclideanHomography& motion, const Eigen::Vector2d& point)
@@ -251,7 +253,8 @@ Twist Servo25d::command(double time)
   const Servo25dError error = servo25dError(now, chosen_);
   const double depth = distance() / now.normal.dot(chosen_.homogeneous()) * std::exp(error.depth);
   const Eigen::Vector2d at = chosen_ + error.point;
-  if (!at.allFinite() || !std::isfinite(depth) || !(depth > 0.0) || !error.rotation.allFinite())
+  constexpr double SMALLEST_DEPTH = 1e-4;  // with which ViSP's interaction matrix can be computed [m]
+  if (!at.allFinite() || !std::isfinite(depth) || !(depth > SMALLEST_DEPTH) || !error.rotation.allFinite())
   {
     return Twist::Zero();
   }

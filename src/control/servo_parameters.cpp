@@ -2,8 +2,25 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "view_servo/control/servo_parameters.h"
 
+#include "view_servo/geometry/faults.h"
+
 namespace view_servo
 {
+std::vector<std::string> Servo25dParams::validate() const
+{
+  Faults faults;
+  faults.require(gain > 0.0, "gain must be more than 0 1/s");
+  faults.require(near_gain >= gain, "near_gain must be at least gain");
+  faults.require(margin >= 0.0 && margin <= 0.3, "margin must lie in [0, 0.3]");
+  faults.require(distance > 0.0, "distance must be more than 0 m");
+  faults.require(translation_tolerance > 0.0, "translation_tolerance must be more than 0 m");
+  faults.require(rotation_tolerance > 0.0, "rotation_tolerance must be more than 0 rad");
+  faults.require(dwell >= 0.0, "dwell must not be negative");
+  faults.require(loss_tolerance >= 0.0 && loss_tolerance <= 0.5, "loss_tolerance must lie in [0, 0.5] s");
+  faults.require(lost_timeout > 0.0, "lost_timeout must be more than 0 s");
+  return faults.list();
+}
+
 std::vector<Parameter> servoParameters(Servo25dParams& params, VelocityLimits& limits)
 {
   return {

@@ -3,6 +3,8 @@
 #pragma once
 
 #include "view_servo/control/arrival_detector.h"
+#include "view_servo/control/course.h"
+#include "view_servo/control/goal_rules.h"
 #include "view_servo/control/heading_hypotheses.h"
 #include "view_servo/control/heading_vote.h"
 #include "view_servo/control/odometry_history.h"
@@ -15,6 +17,7 @@
 
 #include <limits>
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -87,6 +90,9 @@ struct HomingReport
   int inliers = 0;
 };
 
+/** How far a goal has come. */
+Progress toProgress(const HomingReport& report);
+
 /** What homing goes back to. */
 struct HomingTarget
 {
@@ -110,6 +116,7 @@ public:
   void addOdometry(double stamp, const PlanarPose& base_in_odom)
   {
     odometry_.add(stamp, base_in_odom);
+    takeOdometry(base_in_odom);
   }
 
   /**
@@ -121,8 +128,15 @@ public:
   /** @param grey 8-bit, one channel. @throws std::invalid_argument when it has another size than the stored view. */
   void addImage(double stamp, const cv::Mat& grey);
 
-  /** What the base should do now, by the newest odometry, before limits; zero unless it is known where to go. */
-  virtual BaseVelocity command() = 0;
+  /** Where to go, by all that has been added; STAND unless it is known. */
+  virtual Course course() const = 0;
+
+  /** What the base should do now, by the newest odometry, before limits. */
+  BaseVelocity command() const
+  {
+    const std::optional<PlanarPose> base = odometry_.newest();
+    return base ? along(course(), *base) : BaseVelocity(BaseVelocity::Zero());
+  }
 
   const HomingReport& report() const
   {
@@ -132,6 +146,9 @@ public:
 protected:
   Homing(const HomingParams& params, HomingTarget target);
 
+  virtual void takeOdometry(const PlanarPose& /*base_in_odom*/)
+  {
+  }
   virtual void takeMatches(double stamp, const HeadingEvidence& evidence, const PlanarPose& camera_in_odom) = 0;
   virtual void takeImage(double stamp, const cv::Mat& grey) = 0;
 

@@ -2,6 +2,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include "view_servo/control/goal_rules.h"
 #include "view_servo/control/velocity_limiter.h"
 #include "view_servo/geometry/euclidean_homography.h"
 
@@ -83,6 +84,9 @@ struct ServoReport
   Eigen::Vector2d gains = Eigen::Vector2d::Ones();  ///< the adaptive ones, of x and y, in [0, 1]
   int inliers = 0;
 };
+
+/** How far a goal has come. While it drives the reason stays the same, though numbers change. */
+Progress toProgress(const ServoReport& report);
 
 /**
  * Brings a camera to a stored view of a plane by 2.5D servoing (thesis 8.6; Malis, Chaumette & Boudet 1999): a chosen

@@ -46,10 +46,10 @@ public:
   {
   }
 
-  /** The velocity allowed after `dt` [s] on the way to the one wanted. Not finite: zero. */
+  /** The velocity allowed after `dt` [s] on the way to the one wanted. Zero, and what is not finite, stops at once. */
   Velocity next(const Velocity& wanted, double dt)
   {
-    if (!wanted.allFinite())
+    if (!wanted.allFinite() || wanted.isZero(0.0))
     {
       velocity_.setZero();
     }

@@ -1,0 +1,43 @@
+// Copyright (c) 2026, the view_servo authors
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include "view_servo/control/velocity_limiter.h"
+#include "view_servo/geometry/planar_motion.h"
+
+#include <limits>
+
+namespace view_servo
+{
+/**
+ * What estimation leaves to control: where a base has to go, as a value. It holds until the next image or matches say more,
+ * while odometry goes on. Poses are in odometry's frame.
+ */
+struct Course
+{
+  enum Kind
+  {
+    STAND,    ///< it is not known where to
+    TO_VIEW,  ///< straight to a pose, turning on the way
+    STEP      ///< a length in one direction, without turning (chapter 5 of the thesis)
+  };
+  Kind kind = STAND;
+
+  // TO_VIEW.
+  PlanarPose view;                                             ///< base pose at the view
+  double gain = 1.0;                                           ///< speed per distance [1/s]
+  double turn_gain = 1.0;                                      ///< turn rate per yaw error [1/s]
+  double min_speed = 0.0;                                      ///< whatever the distance is [m/s]
+  double max_speed = std::numeric_limits<double>::infinity();  ///< likewise
+
+  // STEP.
+  PlanarPose start;      ///< base pose at its beginning
+  double heading = 0.0;  ///< in the base's frame there [rad]
+  double length = 0.0;   ///< [m]
+  double speed = 0.0;    ///< [m/s]
+};
+
+/** The velocity of a base that follows a course, before limits. */
+BaseVelocity along(const Course& course, const PlanarPose& base_in_odom);
+
+}  // namespace view_servo

@@ -1,0 +1,66 @@
+// Copyright (c) 2026, the view_servo authors
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <string>
+
+namespace view_servo
+{
+/** @file
+ * When a driver's goal ends, when its robot stands and when it may move: the one place that decides, without ROS.
+ */
+
+/** How far a goal has come, as its driver sees it. */
+struct Progress
+{
+  enum State
+  {
+    PREPARING,  ///< accepted; what it needs is waited for
+    ACQUIRING,  ///< looks for the view
+    DRIVING,    ///< knows where to go
+    LOST,       ///< knew, and waits to know again
+    ARRIVED,    ///< at the view
+    FAILED      ///< given up
+  };
+  State state = PREPARING;
+  std::string reason;  ///< of the state, one line
+};
+
+/** What else decides in a cycle of control. Times are by a steady clock. */
+struct Circumstances
+{
+  bool shutting_down = false;  ///< the node ends
+  bool replaced = false;       ///< another goal has come
+  bool enabled = true;
+  bool cancelled = false;
+  bool heard = true;     ///< somebody listens to the commands, or nobody needs to
+  double elapsed = 0.0;  ///< since the goal was accepted [s]
+  double timeout = 0.0;  ///< of the goal [s]
+  std::string fault;     ///< why what is known cannot be trusted any more: time went back, an exception; empty: none
+  std::string missing_input;  ///< what does not come, and since when; empty: everything does
+  double missing_for = 0.0;   ///< [s]
+  double patience = 0.0;      ///< after which a goal whose input is missing ends [s]
+};
+
+/** What is to be done in a cycle of control. */
+struct Verdict
+{
+  enum What
+  {
+    DRIVE,    ///< send the velocity that is wanted
+    STAND,    ///< send zero, the goal goes on
+    SUCCEED,  ///< stop, and end the goal with success
+    ABORT     ///< stop, and end the goal without
+  };
+  What what;
+  std::string reason;  ///< one line, never empty
+};
+
+/**
+ * Judges a goal. The first that holds decides: the node ends, another goal has come, what is known cannot be trusted,
+ * disabled, cancelled, arrived, given up, timeout, nobody listens, an input is missing. The last two do not matter while the
+ * goal is prepared.
+ */
+Verdict judge(const Circumstances& circumstances, const Progress& progress);
+
+}  // namespace view_servo
