@@ -2,6 +2,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "view_servo/control/joint_guard.h"
 
+#include <algorithm>
 #include <cmath>
 #include <cstddef>
 #include <cstdio>
@@ -9,18 +10,30 @@
 
 namespace view_servo
 {
-JointGuard::JointGuard(std::map<std::string, JointLimits> limits, double margin)
-  : limits_(std::move(limits)), margin_(margin)
+JointGuard::JointGuard(std::map<std::string, JointLimits> limits, double margin, double max_age)
+  : limits_(std::move(limits)), margin_(margin), max_age_(max_age)
 {
 }
 
-void JointGuard::add(double time, const std::vector<std::string>& names, const std::vector<double>& positions,
+std::string JointGuard::add(double time, const std::vector<std::string>& names, const std::vector<double>& positions,
                      const std::vector<double>& velocities)
 {
+  constexpr double BEYOND = 0.1;  // of the range, where an arm can hardly be
+  std::string unbelievable;
   for (std::size_t i = 0; i < names.size() && i < positions.size(); ++i)
   {
-    if (limits_.count(names[i]) == 0 || !std::isfinite(positions[i]))
+    const auto limits = limits_.find(names[i]);
+    if (limits == limits_.end())
     {
+      continue;
+    }
+    const auto [lower, upper] = limits->second;
+    const double beyond = std::max(margin_, BEYOND * (upper - lower));
+    if (!(positions[i] >= lower - beyond && positions[i] <= upper + beyond))
+    {
+      char text[100];
+      std::snprintf(text, sizeof(text), "' is said to be at %.3g, its limits are %.3g and %.3g", positions[i], lower, upper);
+      unbelievable = "joint '" + names[i] + text;
       continue;
     }
     Joint joint{ time, positions[i], 0.0 };
@@ -35,6 +48,7 @@ void JointGuard::add(double time, const std::vector<std::string>& names, const s
     }
     joints_[names[i]] = joint;
   }
+  return unbelievable;
 }
 
 std::string JointGuard::problem(double time)
@@ -48,7 +62,8 @@ std::string JointGuard::problem(double time)
     const bool low = joint.position < limits.lower + margin_;
     const bool high = joint.position > limits.upper - margin_;
     const double outwards = low ? -joint.velocity : joint.velocity;
-    if ((!low && !high) || outwards < -STANDS)
+    const bool old = time - joint.time > max_age_;
+    if (old || (!low && !high) || outwards < -STANDS)
     {
       stuck_since_.erase(name);
       continue;

@@ -33,9 +33,11 @@ CameraInputParams CameraInputParams::read(ParameterReader& reader)
   return params;
 }
 
-CameraInput::CameraInput(const ros::NodeHandle& nh, const CameraInputParams& params, Callback on_frame)
+CameraInput::CameraInput(const ros::NodeHandle& nh, const CameraInputParams& params, Callback on_frame,
+                         std::function<void(const std::string&)> on_problem)
   : params_(params),
     on_frame_(std::move(on_frame)),
+    on_problem_(std::move(on_problem)),
     last_diagnosis_(ros::WallTime::now()),
     transport_(nh),
     synchronizer_(static_cast<std::uint32_t>(params.queue_size))
@@ -73,6 +75,19 @@ CameraFrame CameraInput::latest() const
                      ", ~max_image_age is " + seconds(params_.max_image_age));
   }
   return latest_;
+}
+
+std::string CameraInput::missing(CameraFrame& frame, const CameraFrame& before) const
+{
+  try
+  {
+    frame = latest();
+    return frame.image == before.image ? "no further image has come on '" + imageTopic() + "'" : "";
+  }
+  catch (const ImageError& error)
+  {
+    return oneLine(error);
+  }
 }
 
 void CameraInput::diagnose(diagnostic_updater::DiagnosticStatusWrapper& status)
@@ -133,6 +148,10 @@ void CameraInput::take(const sensor_msgs::ImageConstPtr& image, const sensor_msg
   if (!problem.empty())
   {
     ROS_ERROR_STREAM_THROTTLE(ERROR_PERIOD, problem << "; its images are not used");
+    if (on_problem_)
+    {
+      on_problem_(problem);
+    }
   }
   else if (on_frame_)
   {

@@ -56,6 +56,13 @@ bool isCalibrated(const sensor_msgs::CameraInfo& info)
   return info.K[0] > 0.0 && info.K[4] > 0.0;
 }
 
+bool sameCalibration(const sensor_msgs::CameraInfo& a, const sensor_msgs::CameraInfo& b)
+{
+  sensor_msgs::CameraInfo other = b;
+  other.header = a.header;
+  return other == a;
+}
+
 Camera toCamera(const sensor_msgs::CameraInfo& info)
 {
   image_geometry::PinholeCameraModel model;

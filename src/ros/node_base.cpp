@@ -3,8 +3,12 @@
 #include "view_servo/ros/node_base.h"
 
 #include <algorithm>
+#include <chrono>
+#include <cstdio>
 #include <cstdlib>  // says whether this is glibc
+#include <optional>
 #include <sstream>
+#include <utility>
 
 #ifdef __GLIBC__
 #include <malloc.h>
@@ -46,6 +50,37 @@ double secondsBetween(const ros::Time& from, const ros::Time& to)
 double ageOf(const ros::Time& stamp)
 {
   return secondsBetween(stamp, ros::Time::now());
+}
+
+ExitDeadline::ExitDeadline(std::function<bool()> asked) : thread_([this, asked = std::move(asked)] { watch(asked); })
+{
+}
+
+ExitDeadline::~ExitDeadline()
+{
+  over_ = true;
+  thread_.join();
+}
+
+void ExitDeadline::watch(const std::function<bool()>& asked)
+{
+  constexpr std::chrono::milliseconds POLL(20);
+  constexpr std::chrono::milliseconds PATIENCE(1500);
+  std::optional<std::chrono::steady_clock::time_point> since;
+  while (!over_)
+  {
+    const auto now = std::chrono::steady_clock::now();
+    if (since && now - *since > PATIENCE)
+    {
+      std::fputs("ended at once: the node did not end in time by itself\n", stderr);
+      std::_Exit(0);
+    }
+    if (!since && asked())
+    {
+      since = now;
+    }
+    std::this_thread::sleep_for(POLL);
+  }
 }
 
 void keepFreedMemory()

@@ -37,9 +37,7 @@ Rectifier::Rectifier(const sensor_msgs::CameraInfo& info) : info_(info)
 
 bool Rectifier::isOf(const sensor_msgs::CameraInfo& info) const
 {
-  sensor_msgs::CameraInfo other = info;
-  other.header = info_.header;
-  return other == info_;
+  return sameCalibration(info_, info);
 }
 
 cv::Mat Rectifier::image(const cv::Mat& raw) const

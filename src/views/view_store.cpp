@@ -18,6 +18,8 @@
 #include <iterator>
 #include <limits>
 #include <sstream>
+#include <stdexcept>
+#include <string>
 #include <string_view>
 #include <system_error>
 
@@ -404,6 +406,16 @@ void requireValidName(const std::string& action, const std::string& name)
 }
 
 }  // namespace
+
+void requireSize(const StoredView& view, const cv::Size& camera)
+{
+  if (view.image.size() != camera)
+  {
+    throw std::runtime_error("view '" + view.name + "' has " + std::to_string(view.image.cols) + " x " +
+                             std::to_string(view.image.rows) + " pixels, the camera " + std::to_string(camera.width) +
+                             " x " + std::to_string(camera.height));
+  }
+}
 
 bool isValidViewName(const std::string& name)
 {

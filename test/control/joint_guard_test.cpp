@@ -19,7 +19,7 @@ protected:
     guard_.add(time, { "free", "elbow" }, { 9.0, position }, { 0.0, velocity });
   }
 
-  JointGuard guard_{ { { "elbow", { -1.0, 2.0 } }, { "never_seen", { 0.0, 1.0 } } }, 0.02 };
+  JointGuard guard_{ { { "elbow", { -1.0, 2.0 } }, { "never_seen", { 0.0, 1.0 } } }, 0.02, 1.0 };
 };
 
 TEST_F(JointGuardTest, SaysNothingWithinTheLimits)
@@ -62,9 +62,28 @@ TEST_F(JointGuardTest, TakesVelocitiesFromPositions)
 
 TEST_F(JointGuardTest, IsNotConfusedByNonsense)
 {
-  guard_.add(0.0, { "elbow", "free" }, {}, {});
-  guard_.add(0.0, { "elbow" }, { std::numeric_limits<double>::quiet_NaN() }, {});
+  EXPECT_EQ(guard_.add(0.0, { "elbow", "free" }, {}, {}), "");
+  EXPECT_NE(guard_.add(0.0, { "elbow" }, { std::numeric_limits<double>::quiet_NaN() }, {}).find("'elbow'"),
+            std::string::npos);
   EXPECT_EQ(guard_.problem(1.0), "");
+}
+
+TEST_F(JointGuardTest, DoesNotBelieveAPositionFarBeyondTheLimits)
+{
+  EXPECT_EQ(guard_.add(0.0, { "elbow" }, { 2.2 }, { 0.0 }), "");  // an encoder may be off by that
+  for (const double nowhere : { 2.4, 99.0, -1.4, -1e300, std::numeric_limits<double>::infinity() })
+  {
+    EXPECT_NE(guard_.add(0.1, { "elbow" }, { nowhere }, { 1.0 }).find("'elbow' is said to be at"), std::string::npos);
+  }
+  EXPECT_NE(guard_.add(0.1, { "elbow", "free" }, { 99.0, 9.0 }, {}), "");
+  EXPECT_EQ(guard_.add(0.1, { "free" }, { 99.0 }, {}), "");
+}
+
+TEST_F(JointGuardTest, ForgetsWhatIsOld)
+{
+  at(0.0, 1.99, 0.1);
+  EXPECT_NE(guard_.problem(0.9), "");
+  EXPECT_EQ(guard_.problem(1.1), "");
 }
 
 }  // namespace

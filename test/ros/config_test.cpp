@@ -57,8 +57,8 @@ TEST(Config, HomingHasEveryParameterAtItsDefault)
   VelocityLimits limits;
   expectEveryParameterAtItsDefault(
       "homing.yaml", homingParameters(params, limits),
-      { "view", "views_dir", "base_frame", "point_matcher", "line_matcher", "dry_run", "timeout", "control_rate",
-        "image_timeout", "odometry_timeout", "match_timeout", "image_transport", "queue_size", "max_image_age" });
+      { "view", "views_dir", "base_frame", "dry_run", "timeout", "start_patience", "control_rate", "image_timeout",
+        "odometry_timeout", "match_timeout", "image_transport", "queue_size", "max_image_age" });
 }
 
 TEST(Config, HomographyTrackerHasEveryParameterAtItsDefault)
@@ -73,9 +73,10 @@ TEST(Config, ServoHasEveryParameterAtItsDefault)
 {
   Servo25dParams params;
   VelocityLimits limits = ARM_LIMITS;
-  expectEveryParameterAtItsDefault("servo_25d.yaml", servoParameters(params, limits),
-                                   { "views_dir", "homography_tracker", "dry_run", "timeout", "acquire_timeout",
-                                     "control_rate", "homography_timeout", "max_homography_age", "joint_margin" });
+  expectEveryParameterAtItsDefault(
+      "servo_25d.yaml", servoParameters(params, limits),
+      { "views_dir", "dry_run", "timeout", "start_patience", "acquire_timeout", "control_rate", "joint_timeout",
+        "homography_timeout", "max_homography_age", "joint_margin" });
 }
 
 }  // namespace

@@ -16,19 +16,24 @@ struct JointLimits
 };
 
 /**
- * Watches over an arm's joints: which of them is at a limit and does not come away from it. Times in seconds of any one clock.
+ * Watches over an arm's joints: which of them is at a limit and does not come away from it. Times in seconds of any one clock. What was
+ * said of a joint does not count for ever.
  */
 class JointGuard
 {
 public:
-  /** @param margin that counts as being at a limit, as the limits' unit, >= 0. */
-  JointGuard(std::map<std::string, JointLimits> limits, double margin);
+  /**
+   * @param margin that counts as being at a limit, as the limits' unit, >= 0.
+   * @param max_age after which what was said of a joint does not count any more [s], > 0.
+   */
+  JointGuard(std::map<std::string, JointLimits> limits, double margin, double max_age);
 
   /**
    * Where joints are. Those without limits do not matter, others may be missing.
    * @param velocities as many as positions, or none: then they follow from the positions.
+   * @return which position is not believed, as it is no number or lies far beyond the limits; empty: all are.
    */
-  void add(double time, const std::vector<std::string>& names, const std::vector<double>& positions,
+  std::string add(double time, const std::vector<std::string>& names, const std::vector<double>& positions,
            const std::vector<double>& velocities);
 
   /**
@@ -55,6 +60,7 @@ private:
 
   std::map<std::string, JointLimits> limits_;
   double margin_;
+  double max_age_;
   std::map<std::string, Joint> joints_;
   std::map<std::string, double> stuck_since_;
 };

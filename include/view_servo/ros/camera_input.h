@@ -53,11 +53,18 @@ class CameraInput
 public:
   using Callback = std::function<void(const CameraFrame&)>;
 
-  /** @param on_frame called for every usable frame, from a spinner's thread; has to be quick. */
-  CameraInput(const ros::NodeHandle& nh, const CameraInputParams& params, Callback on_frame = Callback());
+  /**
+   * Both are called from a spinner's thread, and have to be quick.
+   * @param on_frame called for every usable frame. @param on_problem called for every other one, with what is wrong.
+   */
+  CameraInput(const ros::NodeHandle& nh, const CameraInputParams& params, Callback on_frame = Callback(),
+              std::function<void(const std::string&)> on_problem = {});
 
   /** @throws ImageError, saying why, when there is no usable frame or it is too old. */
   CameraFrame latest() const;
+
+  /** What is wrong with latest(), in one line; empty: nothing, and `frame` is it. @param before frame that does not do. */
+  std::string missing(CameraFrame& frame, const CameraFrame& before = CameraFrame()) const;
 
   /** Where images come from, resolved. */
   std::string imageTopic() const
@@ -75,6 +82,7 @@ private:
 
   CameraInputParams params_;
   Callback on_frame_;
+  std::function<void(const std::string&)> on_problem_;
   mutable std::mutex mutex_;
   CameraFrame latest_;
   std::string problem_;  // why the last frame was not usable, or none came

@@ -75,8 +75,8 @@ ServoStatus idleStatus(const CommandGate& gate);
 /** Whether idleStatus() has to be told, because the gate has been switched since the last status. */
 bool isOutdated(const ServoStatus& last, const CommandGate& gate);
 
-/** Who has moved something sends zeros for a while after, and then nothing: others may drive, too. */
-class Zeros
+/** After a robot was moved, zeros are sent for some cycles, and then nothing, so that another node may drive it. */
+class StopBurst
 {
 public:
   /** A command was sent. */
@@ -85,7 +85,7 @@ public:
     count_ = zero ? count_ + 1 : 0;
     ever_ = true;
   }
-  /** Whether without anything to do a zero is still to be sent. */
+  /** Whether another zero has to be sent. */
   bool due() const
   {
     constexpr int ENOUGH = 20;
@@ -121,6 +121,7 @@ int runControlNode(int argc, char** argv, const std::string& name)
   const ros::WallDuration poll(0.01);
   const ros::WallDuration flush(0.1);  // for the last command to leave
   keepFreedMemory();
+  const ExitDeadline exit_deadline(&detail::shutdownRequested);
   ros::init(argc, argv, name, ros::init_options::NoSigintHandler);
   const ros::NodeHandle nh;
   detail::deferShutdown();
@@ -133,7 +134,7 @@ int runControlNode(int argc, char** argv, const std::string& name)
     {
       poll.sleep();
     }
-    node.stop();
+    guarded("the end", [&] { node.stop(); });
     flush.sleep();
     spinner.stop();
     ros::shutdown();

@@ -40,6 +40,9 @@ ros::Time toStamp(double seconds);
 /** Whether K says anything: REP 104 has an uncalibrated camera send it all zero. */
 bool isCalibrated(const sensor_msgs::CameraInfo& info);
 
+/** Whether two calibrations say the same, whatever their headers. */
+bool sameCalibration(const sensor_msgs::CameraInfo& a, const sensor_msgs::CameraInfo& b);
+
 /**
  * The camera of the image that comes with `info`: binning and region of interest are worked into the size, the
  * intrinsics and the projection, so that they hold for the pixels of that image.

@@ -15,9 +15,12 @@
 #include <boost/function.hpp>
 #include <boost/shared_ptr.hpp>
 
+#include <atomic>
 #include <cstdint>
 #include <exception>
+#include <functional>
 #include <string>
+#include <thread>
 
 namespace view_servo
 {
@@ -65,6 +68,26 @@ std::string guarded(const std::string& what, const Body& body)
  * each time costs a third of the time that it takes to work on them. Does nothing where the C library is not glibc.
  */
 void keepFreedMemory();
+
+/**
+ * Ends the process when it has not ended by itself a while after it was asked to: neither a long computation nor ROS, which can wait
+ * for a peer that does not answer, may keep a node alive. What drives has sent its zeros by then; files are written in one step.
+ */
+class ExitDeadline
+{
+public:
+  /** @param asked whether the process has been asked to end. */
+  explicit ExitDeadline(std::function<bool()> asked);
+  ~ExitDeadline();
+  ExitDeadline(const ExitDeadline&) = delete;
+  ExitDeadline& operator=(const ExitDeadline&) = delete;
+
+private:
+  void watch(const std::function<bool()>& asked);
+
+  std::atomic<bool> over_{ false };
+  std::thread thread_;
+};
 
 /**
  * What all nodes share: handles, services that answer whatever happens, and `/diagnostics` once a second of wall time,
@@ -147,6 +170,7 @@ int runNode(int argc, char** argv, const std::string& name)
   constexpr std::uint32_t SPINNER_THREADS = 3;
   keepFreedMemory();
   ros::init(argc, argv, name);
+  const ExitDeadline exit_deadline(&ros::isShuttingDown);
   const ros::NodeHandle nh;  // outlives the node: without any handle, ROS ends and the last words are lost
   try
   {

@@ -46,6 +46,9 @@ public:
 /** Whether a name matches [A-Za-z0-9][A-Za-z0-9_-]{0,63}: it is also a file's name, so nothing else is let through. */
 bool isValidViewName(const std::string& name);
 
+/** @throws std::runtime_error when the view's image has another size than the camera's. */
+void requireSize(const StoredView& view, const cv::Size& camera);
+
 /**
  * Stored views in a directory, one `NAME.yaml` each beside its image `NAME.HASH.png`.
  *

@@ -1,0 +1,40 @@
+// Copyright (c) 2026, the view_servo authors
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include "view_servo/Heading.h"
+#include "view_servo/PointMatch.h"
+#include "view_servo/control/heading_vote.h"
+#include "view_servo/control/homing.h"
+#include "view_servo/control/velocity_limiter.h"
+#include "view_servo/geometry/planar_motion.h"
+
+#include <geometry_msgs/PoseStamped.h>
+#include <geometry_msgs/TwistStamped.h>
+#include <nav_msgs/Odometry.h>
+#include <ros/time.h>
+
+#include <string>
+#include <vector>
+
+namespace view_servo
+{
+/** @file
+ * Between the core's types for a mobile base and messages.
+ */
+
+/** The base on the floor, in odometry's frame; not finite where the message is not. */
+PlanarPose toPlanarPose(const nav_msgs::Odometry& message);
+
+geometry_msgs::TwistStamped toTwistStamped(const BaseVelocity& velocity, const ros::Time& stamp,
+                                           const std::string& base_frame);
+
+/** Matches with their scores as weights, in pixels; without those whose score is negative or no number. */
+HeadingEvidence toHeadingEvidence(const std::vector<PointMatch>& matches);
+
+Heading toHeading(const HomingReport& report, const std::string& base_frame);
+
+/** The direction to the view for rviz: at the base, the x axis towards the view. */
+geometry_msgs::PoseStamped toHeadingArrow(const HomingReport& report, const std::string& base_frame);
+
+}  // namespace view_servo

@@ -1,0 +1,38 @@
+// Copyright (c) 2026, the view_servo authors
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include "view_servo/control/homing.h"
+#include "view_servo/control/velocity_limiter.h"
+
+#include <ros/node_handle.h>
+#include <ros/publisher.h>
+
+#include <string>
+
+namespace view_servo
+{
+/** What homing publishes besides its status: commands as Twist and TwistStamped, and the heading, with an arrow for rviz. */
+class BaseOutput
+{
+public:
+  /** @param command_topic of the Twist; that of the TwistStamped has "_stamped" behind it. */
+  BaseOutput(ros::NodeHandle& nh, const std::string& command_topic, std::string base_frame);
+
+  /** Publishes a command. */
+  void publish(const BaseVelocity& velocity) const;
+  /** Publishes the heading, and the arrow while there is one. */
+  void publish(const HomingReport& report) const;
+
+  /** Whether somebody listens to commands. */
+  bool heard() const;
+
+private:
+  std::string base_frame_;
+  ros::Publisher commands_;
+  ros::Publisher stamped_commands_;
+  ros::Publisher headings_;
+  ros::Publisher arrows_;
+};
+
+}  // namespace view_servo

@@ -1,0 +1,534 @@
+// Copyright (c) 2026, the view_servo authors
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include "view_servo/control/goal_rules.h"
+#include "view_servo/ros/driver_context.h"
+#include "view_servo/ros/mailbox.h"
+
+#include <actionlib/server/action_server.h>
+#include <diagnostic_msgs/DiagnosticStatus.h>
+#include <diagnostic_updater/DiagnosticStatusWrapper.h>
+
+#include <algorithm>
+#include <atomic>
+#include <chrono>
+#include <cmath>
+#include <condition_variable>
+#include <cstdint>
+#include <exception>
+#include <limits>
+#include <memory>
+#include <mutex>
+#include <optional>
+#include <string>
+#include <thread>
+#include <utility>
+
+namespace view_servo
+{
+/**
+ * A node that drives a robot to a stored view: goals, the gate, limits, commands, status and diagnostics. What is the robot's own
+ * is `Driver`. Parameters, all private:
+ *  - `~dry_run`: see CommandGate; `~timeout`, `~control_rate`, `~start_patience`: see DriverParams.
+ *
+ * Publishes `~wanted_view` (view_servo/WantedView, latched), which matchers and trackers follow: nothing that moves a robot waits
+ * for the answer of a service. `status` (view_servo/ServoStatus, latched); `/diagnostics`.
+ * Services: `~enable` (std_srvs/SetBool). Action: Driver::ACTION.
+ *
+ * A goal exists from the moment it is taken. A thread of the node's own prepares it, and may wait; until it begins, and then in every
+ * cycle, judge() decides whether it goes on. Whatever ends a goal, first zero is sent, then the reason is published, and zeros go on
+ * for a while. One mutex guards node and driver (see DriverContext). Callbacks of actionlib only fill mailboxes.
+ *
+ * `Driver` has
+ *  - `Action`, `Velocity`, `Limiter` (of Velocity), `Task` (a goal that is ready to begin) and `ACTION`, the action's name;
+ *  - `Params`, with `DriverParams node`, `VelocityLimits limits`, `double lost_timeout` [s], after which a goal without an input
+ *    ends, and `static Params read(ParameterReader&)`;
+ *  - a constructor (DriverContext&, const Params&);
+ *  - `std::unique_ptr<Task> prepare(const Goal&)`, without the mutex; may wait by DriverContext::require(); throws to refuse.
+ *    The node itself waits for somebody who listens to the commands;
+ *  and, all with the mutex held,
+ *  - `void begin(std::unique_ptr<Task>)` and `void end()`, after which it knows nothing of a goal;
+ *  - `Progress progress() const`, of a goal that has begun;
+ *  - `Velocity wanted(double time)`, before limits; `void sent(double time, const Velocity&)`, what followers were told, and
+ *    `void stands(double time, const std::string& why)`, when the robot stands because an input is missing (times of ROS [s]);
+ *  - `void publish(const Velocity&)`, a command; `bool heard() const`, whether somebody listens to commands;
+ *  - `std::optional<double> answered()`: age of an input [ms] that the command just sent is the first to follow;
+ *  - `void fill(ServoStatus&) const`, `void fill(Result&) const`, `void fill(Feedback&, const ServoStatus&) const`;
+ *  - `void diagnose(diagnostic_updater::DiagnosticStatusWrapper&) const`;
+ *  - `std::string idleView() const`: view that is wanted without a goal; empty: none.
+ */
+template <typename Driver>
+class DriverNode : public DriverContext
+{
+public:
+  DriverNode(const ros::NodeHandle& nh, const ros::NodeHandle& private_nh)
+    : DriverNode(nh, private_nh, ParameterReader(private_nh))
+  {
+  }
+
+  ~DriverNode()
+  {
+    control_timer_.stop();
+    {
+      const std::lock_guard<std::mutex> lock(mutex_);
+      stopping_ = true;
+    }
+    wake_.notify_all();
+    goal_thread_.join();
+    for (ros::Subscriber& subscriber : subscribers_)
+    {
+      subscriber.shutdown();
+    }
+  }
+
+  /** Sends zero, for good, and ends the goal. */
+  void stop()
+  {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    if (!std::exchange(stopping_, true))
+    {
+      guarded("the last cycle", [this] { cycle(); });
+      sendZero();
+    }
+    wake_.notify_all();
+  }
+
+private:
+  using Clock = std::chrono::steady_clock;
+  using Action = typename Driver::Action;
+  using Order = typename Action::_action_goal_type::_goal_type;
+  using Result = typename Action::_action_result_type::_result_type;
+  using Feedback = typename Action::_action_feedback_type::_feedback_type;
+  using Server = actionlib::ActionServer<Action>;
+  using Handle = typename Server::GoalHandle;
+  using Velocity = typename Driver::Velocity;
+  using Params = typename Driver::Params;
+
+  enum class Stage
+  {
+    TAKEN,
+    PREPARING,
+    RUNNING
+  };
+
+  /** A goal on its way. */
+  struct Goal
+  {
+    Handle handle;
+    Order order;
+    std::string id;
+    double timeout;  ///< [s]
+    std::uint64_t serial;
+    Clock::time_point start = Clock::now();
+    Stage stage = Stage::TAKEN;
+    bool cancelled = false;
+  };
+
+  DriverNode(const ros::NodeHandle& nh, const ros::NodeHandle& private_nh, ParameterReader reader)
+    : DriverContext(nh, private_nh, reader),
+      params_(readParams(reader)),
+      limiter_(params_.limits),
+      status_(nh_),
+      server_(nh_, Driver::ACTION, false),
+      driver_(*this, params_)
+  {
+    start_patience_ = params_.node.start_patience;
+    enable_service_ = serve("enable", &DriverNode::enable, this);
+    diagnostics_.add(Driver::ACTION, this, &DriverNode::diagnose);
+    status_.publish(idleStatus(gate_));
+    publishWantedView(driver_.idleView(), "");
+    // Called with the action server's lock held.
+    server_.registerGoalCallback([this](Handle handle) { new_goals_.put(handle); });
+    server_.registerCancelCallback([this](Handle handle) { cancelled_goals_.put(handle); });
+    server_.start();
+    goal_thread_ = std::thread([this] { prepareGoals(); });
+    control_timer_ =
+        every(1.0 / params_.node.control_rate, "control", [this] { apply("a cycle of control", [this] { cycle(); }); });
+  }
+
+  static Params readParams(ParameterReader& reader)
+  {
+    Params params = Params::read(reader);
+    reader.finish();
+    return params;
+  }
+
+  void enable(const std_srvs::SetBool::Request& request, std_srvs::SetBool::Response& response)
+  {
+    response = gate_.set(request.data != 0);
+  }
+
+  // ------------------------------------------------------------------------------------------------ the driver's view
+
+  std::string goalId() const override
+  {
+    return goal_ ? goal_->id : "";
+  }
+  bool goalRuns() const override
+  {
+    return goal_ && goal_->stage == Stage::RUNNING;
+  }
+  bool preparing() const override
+  {
+    return !stopping_ && goal_ && goal_->stage == Stage::PREPARING && goal_->serial == prepared_serial_;
+  }
+  void abort(std::string reason) override
+  {
+    if (goal_)
+    {
+      finish(false, std::move(reason));
+    }
+  }
+
+  // --------------------------------------------------------------------------------------------------------- goals
+
+  /** The newest goal that has come; empty: none. Older ones and cancelled ones end here. */
+  std::optional<Handle> newGoal()
+  {
+    std::optional<Handle> newest;
+    for (Handle& handle : new_goals_.takeAll())
+    {
+      refuse(newest, "another goal has come");
+      newest = handle;
+    }
+    for (const Handle& handle : cancelled_goals_.takeAll())
+    {
+      if (newest && *newest == handle)
+      {
+        refuse(newest, "the goal was cancelled");
+      }
+      else if (goal_ && goal_->handle == handle)
+      {
+        goal_->cancelled = true;
+      }
+    }
+    return newest;
+  }
+
+  /** Ends a goal that was never taken, and forgets it. */
+  static void refuse(std::optional<Handle>& handle, const std::string& reason)
+  {
+    if (handle)
+    {
+      Result result;
+      result.message = reason;
+      handle->setCanceled(result, reason);
+      handle.reset();
+    }
+  }
+
+  void take(Handle handle)
+  {
+    handle.setAccepted();
+    const Order order = *handle.getGoal();
+    const bool own = order.timeout > 0.0 && std::isfinite(order.timeout);
+    driver_.end();
+    waiting_for_ = "the goal is being prepared";
+    goal_ = Goal{ handle, order, handle.getGoalID().id, own ? order.timeout : params_.node.timeout, ++serials_ };
+    if (!gate_.open())
+    {
+      finish(false, "disabled: call ~enable first");
+      return;
+    }
+    wake_.notify_all();
+  }
+
+  void prepareGoals()
+  {
+    std::unique_lock<std::mutex> lock(mutex_);
+    while (true)
+    {
+      wake_.wait(lock, [this] { return stopping_ || (goal_ && goal_->stage == Stage::TAKEN); });
+      if (stopping_)
+      {
+        return;
+      }
+      goal_->stage = Stage::PREPARING;
+      const std::uint64_t serial = prepared_serial_ = goal_->serial;
+      const Order order = goal_->order;
+      lock.unlock();
+      std::unique_ptr<typename Driver::Task> task;
+      std::string refusal;
+      try
+      {
+        task = driver_.prepare(order);
+        require([this] {
+          const bool heard = locked([this] { return gate_.dryRun() || driver_.heard(); });
+          return heard ? "" : "nobody listens on '" + resolved(commandTopic()) + "'";
+        });
+      }
+      catch (const std::exception& error)
+      {
+        refusal = oneLine(error);
+      }
+      catch (...)
+      {
+        refusal = "unknown exception";
+      }
+      lock.lock();
+      if (goal_ && goal_->serial == serial && !stopping_)
+      {
+        task ? begin(std::move(task)) : finish(false, refusal.empty() ? "refused without a reason" : refusal);
+      }
+    }
+  }
+
+  void begin(std::unique_ptr<typename Driver::Task> task)
+  {
+    limiter_.stop();
+    missing_since_.reset();
+    for (const std::unique_ptr<DriverInput>& input : inputs_)
+    {
+      input->restart();
+    }
+    goal_->stage = Stage::RUNNING;
+    const std::string fault = guarded("the goal's begin", [&] { driver_.begin(std::move(task)); });
+    if (!fault.empty())
+    {
+      abort(fault);
+    }
+  }
+
+  /** Stops the robot, then ends the goal and publishes why. The reason is a copy: it may be part of what ends here. */
+  void finish(bool success, const std::string reason)  // NOLINT(performance-unnecessary-value-param)
+  {
+    if (goal_->stage == Stage::RUNNING || burst_.due())
+    {
+      sendZero();
+    }
+    Goal goal = *std::exchange(goal_, std::nullopt);
+    Result result;
+    ServoStatus status = makeStatus(success        ? ServoStatus::CONVERGED
+                                    : gate_.open() ? ServoStatus::ABORTED
+                                                   : ServoStatus::DISABLED,
+                                    reason);
+    guarded("the goal's result", [&] {
+      driver_.fill(status);
+      driver_.fill(result);
+      fillFinal(result, status, 0);
+    });
+    result.success = success ? 1 : 0;
+    result.message = reason;
+    result.duration = std::chrono::duration<double>(Clock::now() - goal.start).count();
+    driver_.end();
+    publishWantedView(driver_.idleView(), "");
+    status_.publish(status);
+    if (success)
+    {
+      goal.handle.setSucceeded(result, reason);
+    }
+    else if (goal.cancelled || replaced_)
+    {
+      goal.handle.setCanceled(result, reason);
+    }
+    else
+    {
+      goal.handle.setAborted(result, reason);
+    }
+  }
+
+  /** Where a result has the last status, that is set. */
+  template <typename R>
+  static auto fillFinal(R& result, const ServoStatus& status, int /*preferred*/)
+      -> decltype(result.final = status, void())
+  {
+    result.final = status;
+  }
+  template <typename R>
+  static void fillFinal(R& /*result*/, const ServoStatus& /*status*/, long /*otherwise*/)
+  {
+  }
+
+  // ------------------------------------------------------------------------------------------------------- control
+
+  void cycle()
+  {
+    const ros::Time now = ros::Time::now();
+    const std::string jump = timeJump(last_now_, now, "the clock");
+    std::optional<Handle> next = newGoal();
+    replaced_ = next.has_value();
+    if (goal_)
+    {
+      act(now.toSec(), jump);
+    }
+    replaced_ = false;
+    if (next)
+    {
+      stopping_ ? refuse(next, "the node is shutting down") : take(*next);
+    }
+    if (!goal_)
+    {
+      idle();
+    }
+  }
+
+  void act(double now, const std::string& jump)
+  {
+    const bool runs = goalRuns();
+    Circumstances circumstances;
+    circumstances.shutting_down = stopping_;
+    circumstances.replaced = replaced_;
+    circumstances.enabled = gate_.open();
+    circumstances.cancelled = goal_->cancelled;
+    circumstances.heard = gate_.dryRun() || driver_.heard();
+    circumstances.elapsed = std::chrono::duration<double>(Clock::now() - goal_->start).count();
+    circumstances.timeout = goal_->timeout;
+    circumstances.fault = jump;
+    circumstances.patience = params_.lost_timeout;
+    circumstances.missing_input = runs ? missingInput() : "";
+    if (circumstances.missing_input.empty())
+    {
+      missing_since_.reset();
+    }
+    else
+    {
+      missing_since_ = missing_since_.value_or(Clock::now());
+      circumstances.missing_for = std::chrono::duration<double>(Clock::now() - *missing_since_).count();
+    }
+    const Progress progress = runs ? driver_.progress() : Progress{ Progress::PREPARING, waiting_for_ };
+    const Verdict verdict = judge(circumstances, progress);
+    switch (verdict.what)
+    {
+      case Verdict::DRIVE:
+        drive(now, verdict.reason);
+        break;
+      case Verdict::STAND:
+        stand(now, progress, circumstances.missing_input, verdict.reason);
+        break;
+      default:
+        finish(verdict.what == Verdict::SUCCEED, verdict.reason);
+    }
+  }
+
+  void drive(double now, const std::string& reason)
+  {
+    const Velocity velocity = limiter_.next(driver_.wanted(now), 1.0 / params_.node.control_rate);
+    send(velocity);
+    follow(now, velocity);
+    publishProgress(ServoStatus::SERVOING, reason);
+  }
+
+  void stand(double now, const Progress& progress, const std::string& missing, const std::string& reason)
+  {
+    if (goal_->stage != Stage::RUNNING)
+    {
+      sendDueZero();
+    }
+    else
+    {
+      sendZero();
+      if (!missing.empty())
+      {
+        driver_.stands(now, missing);
+      }
+      follow(now, Velocity::Zero());
+    }
+    const bool lost = progress.state == Progress::LOST || !missing.empty();
+    publishProgress(lost ? ServoStatus::LOST : ServoStatus::ACQUIRING, reason);
+  }
+
+  /** In a dry run nobody follows what is sent. */
+  void follow(double now, const Velocity& velocity)
+  {
+    if (!gate_.dryRun())
+    {
+      driver_.sent(now, velocity);
+    }
+  }
+
+  void publishProgress(std::uint8_t state, const std::string& reason)
+  {
+    ServoStatus status = makeStatus(state, reason);
+    driver_.fill(status);
+    status_.publish(status);
+    const std::optional<double> age = driver_.answered();
+    if (age)
+    {
+      cycles_ += 1;
+      cycle_sum_ += *age;
+      cycle_max_ = std::max(cycle_max_, *age);
+      Feedback feedback;
+      driver_.fill(feedback, status);
+      goal_->handle.publishFeedback(feedback);
+    }
+  }
+
+  void idle()
+  {
+    sendDueZero();
+    if (isOutdated(status_.last(), gate_))
+    {
+      status_.publish(idleStatus(gate_));
+    }
+  }
+
+  void sendDueZero()
+  {
+    if (burst_.due())
+    {
+      sendZero();
+    }
+  }
+
+  void sendZero()
+  {
+    limiter_.stop();
+    send(Velocity::Zero());
+  }
+
+  void send(const Velocity& velocity)
+  {
+    driver_.publish(velocity);
+    burst_.sent(velocity.isZero());
+  }
+
+  void diagnose(diagnostic_updater::DiagnosticStatusWrapper& status)
+  {
+    constexpr double NOT_A_NUMBER = std::numeric_limits<double>::quiet_NaN();
+    const std::lock_guard<std::mutex> lock(mutex_);
+    const ServoStatus& last = status_.last();
+    const bool worrying = last.state == ServoStatus::LOST || last.state == ServoStatus::ABORTED;
+    status.summary(worrying ? diagnostic_msgs::DiagnosticStatus::WARN : diagnostic_msgs::DiagnosticStatus::OK,
+                   last.reason);
+    status.add("Enabled", gate_.enabled());
+    status.add("Dry run", gate_.dryRun());
+    status.add("Image to command, mean [ms]", cycles_ > 0 ? cycle_sum_ / cycles_ : NOT_A_NUMBER);
+    status.add("Image to command, largest [ms]", cycles_ > 0 ? cycle_max_ : NOT_A_NUMBER);
+    for (const std::unique_ptr<DriverInput>& input : inputs_)
+    {
+      status.add("Age of " + input->what() + " [s]", input->age());
+    }
+    driver_.diagnose(status);
+    cycles_ = 0;
+    cycle_sum_ = cycle_max_ = 0.0;
+  }
+
+  const Params params_;
+  Mailbox<Handle> new_goals_;
+  Mailbox<Handle> cancelled_goals_;
+
+  // What follows is guarded by mutex_.
+  std::condition_variable wake_;
+  typename Driver::Limiter limiter_;
+  StopBurst burst_;
+  std::optional<Clock::time_point> missing_since_;
+  ros::Time last_now_;
+  std::uint64_t serials_ = 0;
+  std::uint64_t prepared_serial_ = 0;
+  bool replaced_ = false;
+  bool stopping_ = false;
+  int cycles_ = 0;          // whose commands were the first to follow an input, since the last diagnosis
+  double cycle_sum_ = 0.0;  // [ms]
+  double cycle_max_ = 0.0;
+
+  StatusOutput status_;
+  Server server_;
+  std::optional<Goal> goal_;  // ends before the server that its handle belongs to
+  Driver driver_;
+  ros::ServiceServer enable_service_;
+  std::thread goal_thread_;
+  ros::WallTimer control_timer_;
+};
+
+}  // namespace view_servo

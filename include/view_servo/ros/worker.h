@@ -1,0 +1,82 @@
+// Copyright (c) 2026, the view_servo authors
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include "view_servo/ros/node_base.h"
+
+#include <condition_variable>
+#include <functional>
+#include <mutex>
+#include <string>
+#include <thread>
+#include <utility>
+
+namespace view_servo
+{
+/**
+ * A thread that works on what others put into its inbox, so that they need not wait. It takes all that has gathered at once;
+ * `Inbox`, which can be made empty, says how things gather. Nothing is called while its lock is held but the edits of put().
+ */
+template <typename Inbox>
+class Worker
+{
+public:
+  /** @param what it does, for the log. @param work called by the thread with each inbox; what it throws is logged. */
+  Worker(std::string what, std::function<void(Inbox&&)> work) : what_(std::move(what)), work_(std::move(work))
+  {
+    thread_ = std::thread([this] { run(); });
+  }
+  ~Worker()
+  {
+    {
+      const std::lock_guard<std::mutex> lock(mutex_);
+      stopping_ = true;
+    }
+    wake_.notify_all();
+    thread_.join();
+  }
+  Worker(const Worker&) = delete;
+  Worker& operator=(const Worker&) = delete;
+
+  /** Edits the inbox and wakes the thread. @param edit quick, must not put anything itself. */
+  template <typename Edit>
+  void put(const Edit& edit)
+  {
+    {
+      const std::lock_guard<std::mutex> lock(mutex_);
+      edit(inbox_);
+      full_ = true;
+    }
+    wake_.notify_all();
+  }
+
+private:
+  void run()
+  {
+    std::unique_lock<std::mutex> lock(mutex_);
+    while (true)
+    {
+      wake_.wait(lock, [this] { return stopping_ || full_; });
+      if (stopping_)
+      {
+        return;
+      }
+      full_ = false;
+      Inbox inbox = std::exchange(inbox_, Inbox());
+      lock.unlock();
+      guarded(what_, [&] { work_(std::move(inbox)); });
+      lock.lock();
+    }
+  }
+
+  const std::string what_;
+  const std::function<void(Inbox&&)> work_;
+  std::mutex mutex_;  // guards what follows
+  std::condition_variable wake_;
+  Inbox inbox_;
+  bool full_ = false;
+  bool stopping_ = false;
+  std::thread thread_;
+};
+
+}  // namespace view_servo

@@ -1,0 +1,100 @@
+// Copyright (c) 2026, the view_servo authors
+// SPDX-License-Identifier: BSD-3-Clause
+#include "view_servo/ros/base_conversions.h"
+
+#include "view_servo/ros/conversions.h"
+
+#include <cmath>
+#include <cstdint>
+
+namespace view_servo
+{
+namespace
+{
+std::uint8_t toHeadingState(const HomingReport& report)
+{
+  if (report.at_view)
+  {
+    return Heading::ARRIVED;
+  }
+  switch (report.state)
+  {
+    case HomingState::NEAR:
+      return Heading::NEAR;
+    case HomingState::DOCKING:
+    case HomingState::ARRIVED:
+      return Heading::DOCKING;
+    case HomingState::LOST:
+    case HomingState::FAILED:
+      return Heading::LOST;
+    default:
+      return Heading::APPROACHING;
+  }
+}
+
+}  // namespace
+
+PlanarPose toPlanarPose(const nav_msgs::Odometry& message)
+{
+  const geometry_msgs::Pose& pose = message.pose.pose;
+  geometry_msgs::Transform transform;
+  transform.translation.x = pose.position.x;
+  transform.translation.y = pose.position.y;
+  transform.rotation = pose.orientation;
+  return toPlanar(toIsometry(transform));
+}
+
+geometry_msgs::TwistStamped toTwistStamped(const BaseVelocity& velocity, const ros::Time& stamp,
+                                           const std::string& base_frame)
+{
+  geometry_msgs::TwistStamped message;
+  message.header.stamp = stamp;
+  message.header.frame_id = base_frame;
+  message.twist.linear.x = velocity.x();
+  message.twist.linear.y = velocity.y();
+  message.twist.angular.z = velocity.z();
+  return message;
+}
+
+HeadingEvidence toHeadingEvidence(const std::vector<PointMatch>& matches)
+{
+  HeadingEvidence evidence;
+  for (const PointMatch& match : matches)
+  {
+    if (!(match.score >= 0.0 && std::isfinite(match.score)))
+    {
+      continue;
+    }
+    evidence.pairs.push_back({ { match.reference_x, match.reference_y }, { match.current_x, match.current_y } });
+    evidence.weights.push_back(match.score);
+  }
+  return evidence;
+}
+
+Heading toHeading(const HomingReport& report, const std::string& base_frame)
+{
+  Heading message;
+  message.header.stamp = toStamp(report.stamp);
+  message.header.frame_id = base_frame;
+  message.heading = report.heading;
+  message.yaw_error = report.yaw_error;
+  message.confidence = report.confidence;
+  message.histogram = report.histogram;
+  message.roi_min = report.roi_min;
+  message.roi_max = report.roi_max;
+  message.similarity = report.similarity;
+  message.state = toHeadingState(report);
+  return message;
+}
+
+geometry_msgs::PoseStamped toHeadingArrow(const HomingReport& report, const std::string& base_frame)
+{
+  geometry_msgs::PoseStamped arrow;
+  arrow.header.stamp = toStamp(report.stamp);
+  arrow.header.frame_id = base_frame;
+  arrow.pose.orientation.z = std::sin(0.5 * report.heading);
+  arrow.pose.orientation.w = std::cos(0.5 * report.heading);
+  return arrow;
+}
+
+}  // namespace view_servo

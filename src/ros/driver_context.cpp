@@ -1,0 +1,125 @@
+// Copyright (c) 2026, the view_servo authors
+// SPDX-License-Identifier: BSD-3-Clause
+#include "view_servo/ros/driver_context.h"
+
+#include "view_servo/WantedView.h"
+
+#include <cmath>
+#include <stdexcept>
+
+namespace view_servo
+{
+bool DriverInput::checkStamp(const ros::Time& stamp)
+{
+  constexpr double MAX_AHEAD = 600.0;  // of ROS' clock: clocks may be apart, but no clock says more [s]
+  jump_.clear();
+  const std::string name = what_ + " on " + topics_;
+  if (stamp.isZero())
+  {
+    reject(name + ": no stamp, it is all zero");
+    return false;
+  }
+  const double ahead = -ageOf(stamp);
+  if (ahead > MAX_AHEAD)
+  {
+    reject(name + ": stamped " + seconds(ahead) + " in the future");
+    return false;
+  }
+  if (stamp == last_stamp_)
+  {
+    reject(name + ": stamps stand still");
+    return false;
+  }
+  jump_ = timeJump(last_stamp_, stamp, name);
+  return true;
+}
+
+std::string DriverInput::missing() const
+{
+  if (!needed_ || !watch_.stale())
+  {
+    return "";
+  }
+  return problem_.empty() ? "no " + what_ + " for " + seconds(watch_.timeout()) + " on " + topics_ : problem_;
+}
+
+std::string stampsApart(const DriverInput& odometry, const DriverInput& images)
+{
+  constexpr double MAX_AHEAD = 1.0;   // of odometry [s]
+  constexpr double MAX_BEHIND = 0.5;  // [s]
+  const double ahead = secondsBetween(images.lastStamp(), odometry.lastStamp());
+  const bool known = !images.lastStamp().isZero() && !odometry.lastStamp().isZero();
+  if (!known || (ahead < MAX_AHEAD && ahead > -MAX_BEHIND))
+  {
+    return "";
+  }
+  return "odometry on " + odometry.topics() + " is stamped " + seconds(std::abs(ahead)) +
+         (ahead > 0.0 ? " after" : " before") + " the images on " + images.topics() + ": their clocks are apart";
+}
+
+DriverContext::DriverContext(const ros::NodeHandle& nh, const ros::NodeHandle& private_nh, ParameterReader& reader)
+  : NodeBase(nh, private_nh), gate_(reader)
+{
+  wanted_view_publisher_ = private_nh_.advertise<WantedView>("wanted_view", 1, true);
+}
+
+DriverInput& DriverContext::addInput(const std::string& what, const std::string& topics, double timeout)
+{
+  inputs_.push_back(std::make_unique<DriverInput>(what, topics, timeout));
+  return *inputs_.back();
+}
+
+void DriverContext::require(const std::function<std::string()>& missing)
+{
+  const auto ended = [this] {
+    return locked([this] { return !preparing(); });
+  };
+  const auto lacking = [&] {
+    const std::string what = missing();
+    locked([&] { waiting_for_ = preparing() ? what : waiting_for_; });
+    return what;
+  };
+  const std::string what = waitUntilReady(start_patience_, lacking, ended);
+  if (!what.empty())
+  {
+    throw std::runtime_error(what);
+  }
+  if (ended())
+  {
+    throw std::runtime_error("the goal has ended");
+  }
+}
+
+void DriverContext::wantView(const std::string& view)
+{
+  locked([&] {
+    if (preparing())
+    {
+      publishWantedView(view, goalId());
+    }
+  });
+}
+
+void DriverContext::publishWantedView(const std::string& view, const std::string& goal)
+{
+  WantedView message;
+  message.header.stamp = ros::Time::now();
+  message.view = view;
+  message.goal = goal;
+  wanted_view_publisher_.publish(message);
+}
+
+std::string DriverContext::missingInput() const
+{
+  for (const std::unique_ptr<DriverInput>& input : inputs_)
+  {
+    std::string missing = input->missing();
+    if (!missing.empty())
+    {
+      return missing;
+    }
+  }
+  return "";
+}
+
+}  // namespace view_servo
