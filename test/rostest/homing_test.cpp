@@ -1,39 +1,23 @@
 // Copyright (c) 2026, the view_servo authors
 // SPDX-License-Identifier: BSD-3-Clause
-#include "child_process.h"
-#include "commands.h"
-#include "node_test.h"
+#include "driver_cases.h"
 #include "nodes/robot_messages.h"
 #include "sim/nomad.h"
 #include "sim/renderer.h"
 #include "sim/world.h"
-#include "support/temporary_directory.h"
 
 #include "view_servo/Heading.h"
 #include "view_servo/HomeToViewAction.h"
+#include "view_servo/LineMatches.h"
 #include "view_servo/PointMatches.h"
-#include "view_servo/ServoStatus.h"
 #include "view_servo/geometry/planar_motion.h"
 #include "view_servo/views/view_matcher.h"
 #include "view_servo/views/view_store.h"
 
-#include <actionlib/client/simple_action_client.h>
 #include <geometry_msgs/Twist.h>
-#include <geometry_msgs/TwistStamped.h>
-#include <gtest/gtest.h>
-#include <std_srvs/SetBool.h>
 #include <tf2_ros/static_transform_broadcaster.h>
 
-#include <atomic>
-#include <chrono>
 #include <cmath>
-#include <limits>
-#include <memory>
-#include <mutex>
-#include <string>
-#include <thread>
-#include <utility>
-#include <vector>
 
 namespace view_servo
 {
@@ -41,12 +25,6 @@ namespace test
 {
 namespace
 {
-using Clock = std::chrono::steady_clock;
-using Commands = CommandsOf<geometry_msgs::Twist>;
-using ActionClient = actionlib::SimpleActionClient<HomeToViewAction>;
-
-constexpr double STOPS_WITHIN = 0.3;  // of wall time, whatever fails [s]
-
 /** What there is to see, drawn once: the view, and what a base sees that stands 0.8 m before it. */
 struct Scene
 {
@@ -73,205 +51,181 @@ struct Scene
   }
 };
 
-/** A base that stands still, whatever it is told, and whose inputs can fail. */
-class FakeBase
+const Scene& scene()
+{
+  static const Scene made;
+  return made;
+}
+
+/** A base that stands still, whatever it is told, with a camera and a matcher. */
+class FakeBase : public FakeRobot
 {
 public:
-  FakeBase(const Scene& scene, const std::string& ns) : scene_(scene), nh_(ns)
+  using Action = HomeToViewAction;
+  using Command = geometry_msgs::Twist;
+  static constexpr const char* DRIVER = "homing";
+  static constexpr const char* ACTION = "home";
+  static constexpr const char* SILENT = "no matches";
+  static std::string path()
+  {
+    return HOMING_PATH;
+  }
+
+  explicit FakeBase(const std::string& ns) : FakeRobot(ns, DRIVER)
   {
     images_ = nh_.advertise<sensor_msgs::Image>("image_raw", 2);
     infos_ = nh_.advertise<sensor_msgs::CameraInfo>("camera_info", 2);
     odometry_ = nh_.advertise<nav_msgs::Odometry>("odom", 10);
-    matches_ = nh_.advertise<PointMatches>("point_matches", 2);
+    lines_ = nh_.advertise<LineMatches>("line_matches", 2);
+    reconnect();
+    focal_length = scene().world.camera.k(0, 0);
     broadcaster_.sendTransform(
-        sim::toTransform(scene.world.camera_on_base, sim::BASE_FRAME, sim::CAMERA_FRAME, ros::Time::now()));
-    thread_ = std::thread([this] { run(); });
+        sim::toTransform(scene().world.camera_on_base, sim::BASE_FRAME, sim::CAMERA_FRAME, ros::Time::now()));
+    start(50.0, [this](int cycle) { publish(cycle); });
   }
-  ~FakeBase()
+  ~FakeBase() override
   {
-    running_ = false;
-    thread_.join();
+    stop();
   }
-  FakeBase(const FakeBase&) = delete;
-  FakeBase& operator=(const FakeBase&) = delete;
 
-  std::atomic<bool> camera{ true };
-  std::atomic<bool> odometry{ true };
-  std::atomic<bool> matcher{ true };
+  /** The matcher goes, with all its connections, and comes back. */
+  void reconnect()
+  {
+    const std::lock_guard<std::mutex> lock(publisher_mutex_);
+    matches_.shutdown();
+    matches_ = nh_.advertise<PointMatches>("point_matches", 2);
+  }
+
+  void publishExtremes()
+  {
+    const std::lock_guard<std::mutex> lock(publisher_mutex_);
+    for (const ros::Time& stamp : extremeStamps())
+    {
+      sensor_msgs::CameraInfo info = sim::toCameraInfo(scene().world, 0.0, stamp);
+      images_.publish(toImage(scene().image, sensor_msgs::image_encodings::MONO8, info.header));
+      infos_.publish(info);
+      odometry_.publish(odometry(stamp));
+      matches_.publish(matches(info.header));
+      LineMatches lines;
+      lines.header = info.header;
+      lines.view = wantedView().view;
+      lines_.publish(lines);
+    }
+    const ros::Time now = ros::Time::now();
+    for (const double number : extremeNumbers())
+    {
+      nav_msgs::Odometry message = odometry(now);
+      message.pose.pose.position.x = number;
+      message.pose.pose.orientation.w = number;
+      odometry_.publish(message);
+      PointMatches points = matches(sim::toCameraInfo(scene().world, 0.0, now).header);
+      for (PointMatch& match : points.matches)
+      {
+        match.reference_x = match.current_y = match.score = number;
+      }
+      matches_.publish(points);
+      sensor_msgs::CameraInfo info = sim::toCameraInfo(scene().world, 0.0, now);
+      info.K[0] = info.P[0] = number;
+      infos_.publish(info);
+    }
+    sensor_msgs::Image image =
+        toImage(scene().image, sensor_msgs::image_encodings::MONO8, sim::toCameraInfo(scene().world, 0.0, now).header);
+    infos_.publish(sim::toCameraInfo(scene().world, 0.0, now));
+    image.data.resize(image.data.size() / 2);
+    images_.publish(image);
+    image.width = image.height = 0;
+    image.encoding = "no such encoding";
+    images_.publish(image);
+  }
+
+  std::atomic<bool> moves_odometry{ true };    // publishes it
+  std::atomic<double> odometry_offset{ 0.0 };  // of its stamps against the images' [s]
   std::atomic<bool> black{ false };
-  std::atomic<bool> other_view{ false };
-  std::atomic<double> delay{ 0.0 };  // of all stamps [s]
 
 private:
-  void run()
+  void publish(int cycle)
   {
     constexpr int IMAGE_EVERY = 5;
-    ros::WallRate rate(50.0);
-    for (int cycle = 0; running_ && ros::ok(); ++cycle)
+    const ros::Time time = stamp();
+    const std::lock_guard<std::mutex> lock(publisher_mutex_);
+    if (moves_odometry)
     {
-      const ros::Time stamp = ros::Time::now() - ros::Duration(delay);
-      if (odometry)
-      {
-        nav_msgs::Odometry message;
-        message.header.stamp = stamp;
-        message.header.frame_id = sim::ODOM_FRAME;
-        message.child_frame_id = sim::BASE_FRAME;
-        message.pose.pose = sim::toPose(sim::planarPose(scene_.base.x, scene_.base.y, scene_.base.yaw));
-        odometry_.publish(message);
-      }
-      if (cycle % IMAGE_EVERY == 0)
-      {
-        publishImage(stamp);
-      }
-      rate.sleep();
+      odometry_.publish(odometry(time.isZero() ? time : time + ros::Duration(odometry_offset)));
     }
-  }
-
-  void publishImage(const ros::Time& stamp)
-  {
-    const sensor_msgs::CameraInfo info = sim::toCameraInfo(scene_.world, 0.0, stamp);
+    if (cycle % IMAGE_EVERY != 0)
+    {
+      return;
+    }
+    sensor_msgs::CameraInfo info = sim::toCameraInfo(scene().world, 0.0, time);
+    info.K[0] = info.K[4] = info.P[0] = info.P[5] = calibrated ? focal_length.load() : 0.0;
     if (camera)
     {
-      const cv::Mat image = black ? cv::Mat(scene_.image.size(), CV_8UC1, cv::Scalar(0)) : scene_.image;
+      const cv::Mat image = black ? cv::Mat(scene().image.size(), CV_8UC1, cv::Scalar(0)) : scene().image;
       images_.publish(toImage(image, sensor_msgs::image_encodings::MONO8, info.header));
       infos_.publish(info);
     }
-    if (matcher)
+    if (answers)
     {
-      PointMatches message;
-      message.header = info.header;
-      message.view = other_view ? "another" : "goal";
-      message.matches = black ? std::vector<PointMatch>() : scene_.matches;
-      matches_.publish(message);
+      PointMatches message = matches(info.header);
+      if (fill(message))
+      {
+        matches_.publish(message);
+      }
+      LineMatches lines;
+      lines.header = info.header;
+      if (refuses && fill(lines))
+      {
+        lines_.publish(lines);
+      }
     }
   }
 
-  const Scene& scene_;
-  ros::NodeHandle nh_;
+  PointMatches matches(const std_msgs::Header& header) const
+  {
+    PointMatches message;
+    message.header = header;
+    message.view = wantedView().view;
+    message.matches = black ? std::vector<PointMatch>() : scene().matches;
+    return message;
+  }
+
+  static nav_msgs::Odometry odometry(const ros::Time& time)
+  {
+    nav_msgs::Odometry message;
+    message.header.stamp = time;
+    message.header.frame_id = sim::ODOM_FRAME;
+    message.child_frame_id = sim::BASE_FRAME;
+    const PlanarPose& base = scene().base;
+    message.pose.pose = sim::toPose(sim::planarPose(base.x, base.y, base.yaw));
+    return message;
+  }
+
+  std::mutex publisher_mutex_;
   ros::Publisher images_;
   ros::Publisher infos_;
   ros::Publisher odometry_;
   ros::Publisher matches_;
+  ros::Publisher lines_;
   tf2_ros::StaticTransformBroadcaster broadcaster_;
-  std::atomic<bool> running_{ true };
-  std::thread thread_;
 };
 
-class HomingTest : public ::testing::Test
+INSTANTIATE_TYPED_TEST_SUITE_P(Homing, DriverCases, FakeBase);
+
+class HomingTest : public DriverTest<FakeBase>
 {
 protected:
-  static void SetUpTestSuite()
-  {
-    scene_ = std::make_unique<Scene>();
-    StoredView view;
-    view.name = "goal";
-    view.image = scene_->view;
-    ViewStore(viewsDir("driving/homing")).save(view, true);
-  }
-  static void TearDownTestSuite()
-  {
-    removeViews("driving/homing");
-    scene_.reset();
-  }
-
-  HomingTest() : HomingTest("driving")
-  {
-  }
-  explicit HomingTest(const std::string& ns)
-    : ns_(ns),
-      base_(*scene_, ns),
-      commands_(ns + "/cmd_vel"),
-      headings_(ns + "/heading"),
-      status_(ns + "/status"),
-      client_(ns + "/home", false)
+  using DriverTest<FakeBase>::DriverTest;
+  HomingTest() : DriverTest("driving", "cmd_vel")
   {
   }
 
-  void SetUp() override
-  {
-    ASSERT_TRUE(waitForService(ns_ + "/homing/enable"));
-    ASSERT_TRUE(waitUntil([this] { return client_.isServerConnected(); }));
-    enable(true);
-  }
-  void TearDown() override
-  {
-    client_.cancelAllGoals();
-    enable(false);
-    EXPECT_TRUE(waitUntil([this] { return !commands_.moving(); }));
-  }
-
-  void enable(bool on) const
-  {
-    std_srvs::SetBool service;
-    service.request.data = on ? 1 : 0;
-    ASSERT_TRUE(ros::service::call(ns_ + "/homing/enable", service));
-    EXPECT_TRUE(service.response.success) << service.response.message;
-  }
-
-  void send(const std::string& view, double timeout = 60.0, double step = 0.0)
-  {
-    HomeToViewGoal goal;
-    goal.view = view;
-    goal.timeout = timeout;
-    goal.step = step;
-    client_.sendGoal(goal);
-  }
-
-  /** Sends a goal as soon as its camera is known to the node, and waits until it drives. */
-  void drive()
-  {
-    ASSERT_TRUE(waitUntil([this] {
-      if (client_.getState().isDone() || !sent_)
-      {
-        send("goal");
-        sent_ = true;
-      }
-      return commands_.moving();
-    })) << reason();
-  }
-
-  std::string reason() const
-  {
-    return status_.last() ? status_.last()->reason : "no status";
-  }
-
-  /** After `fault`, the base must stand in time, with a reason that has these words in it. */
-  void expectToStop(const std::function<void()>& fault, std::uint8_t state, const std::string& words)
-  {
-    const Clock::time_point moment = Clock::now();
-    fault();
-    EXPECT_TRUE(waitUntil([&] {
-      return status_.last() && status_.last()->state == state && reason().find(words) != std::string::npos;
-    })) << "it says '"
-        << reason() << "', not '" << words << "'";
-    EXPECT_TRUE(waitUntil([&] { return !commands_.moving(); }));
-    EXPECT_LT(commands_.lastMotionAfter(moment), STOPS_WITHIN);
-  }
-
-  /** The result of the goal sent last. */
-  HomeToViewResult result()
-  {
-    EXPECT_TRUE(waitUntil([this] { return client_.getState().isDone(); })) << reason();
-    const auto found = client_.getResult();
-    return found ? *found : HomeToViewResult();
-  }
-
-  static std::unique_ptr<Scene> scene_;
-  std::string ns_;
-  FakeBase base_;
-  Commands commands_;
-  Recorder<Heading> headings_;
-  Recorder<ServoStatus> status_;
-  ActionClient client_;
-  bool sent_ = false;
+  Recorder<Heading> headings_{ ns_ + "/heading" };
 };
-
-std::unique_ptr<Scene> HomingTest::scene_;
 
 TEST_F(HomingTest, DrivesTowardsTheView)
 {
   drive();
-  const PlanarPose truth = inverse(scene_->base);
+  const PlanarPose truth = inverse(scene().base);
   ASSERT_TRUE(waitUntil([this] { return headings_.last() && std::isfinite(headings_.last()->heading); }));
   const Heading heading = *headings_.last();
   EXPECT_EQ(heading.header.frame_id, sim::BASE_FRAME);
@@ -289,154 +243,84 @@ TEST_F(HomingTest, DrivesTowardsTheView)
 TEST_F(HomingTest, StopsWhenTheCameraStopsAndGoesOnWithIt)
 {
   drive();
-  expectToStop([this] { base_.camera = false; }, ServoStatus::LOST, "no image");
-  base_.camera = true;
-  EXPECT_TRUE(waitUntil([this] { return commands_.moving(); })) << reason();
+  expectToStop([this] { robot_.camera = false; }, ServoStatus::LOST, "no image");
+  robot_.camera = true;
+  expectToGoOn();
 }
 
 TEST_F(HomingTest, StopsWhenOdometryStopsAndGoesOnWithIt)
 {
   drive();
-  expectToStop([this] { base_.odometry = false; }, ServoStatus::LOST, "no odometry");
-  base_.odometry = true;
-  EXPECT_TRUE(waitUntil([this] { return commands_.moving(); })) << reason();
+  expectToStop([this] { robot_.moves_odometry = false; }, ServoStatus::LOST, "no odometry");
+  robot_.moves_odometry = true;
+  expectToGoOn();
 }
 
-TEST_F(HomingTest, StopsWhenTheMatcherDiesAndGivesUp)
+TEST_F(HomingTest, RefusesAndStopsForOdometryOfAnotherTime)
 {
   drive();
-  expectToStop([this] { base_.matcher = false; }, ServoStatus::LOST, "no matches");
-  const HomeToViewResult final = result();
-  EXPECT_FALSE(final.success);
-  EXPECT_NE(final.message.find("no matches"), std::string::npos) << final.message;
-  EXPECT_FALSE(commands_.moving());
+  expectToEnd([this] { robot_.odometry_offset = 2.0; }, GoalState::ABORTED, "after the images on", 2.0 * STOPS_WITHIN);
+  const Clock::time_point moment = Clock::now();
+  send("goal", 2.0);
+  EXPECT_TRUE(waitUntil([this] { return reason().find("their clocks are apart") != std::string::npos; })) << reason();
+  EXPECT_FALSE(result().success);
+  EXPECT_LT(commands_.lastMotionAfter(moment), 0.0);
 }
 
 TEST_F(HomingTest, StopsWhenTheImageTurnsBlackAndGoesOnAfterwards)
 {
   drive();
-  expectToStop([this] { base_.black = true; }, ServoStatus::LOST, "shows nothing");
-  base_.black = false;
-  EXPECT_TRUE(waitUntil([this] { return commands_.moving(); })) << reason();
-}
-
-TEST_F(HomingTest, StopsWhenDisabled)
-{
-  drive();
-  expectToStop([this] { enable(false); }, ServoStatus::DISABLED, "disabled");
-  EXPECT_FALSE(result().success);
-  EXPECT_EQ(client_.getState().state_, actionlib::SimpleClientGoalState::ABORTED);
-}
-
-TEST_F(HomingTest, StopsWhenTheGoalIsCancelled)
-{
-  drive();
-  expectToStop([this] { client_.cancelGoal(); }, ServoStatus::ABORTED, "cancelled");
-  result();
-  EXPECT_EQ(client_.getState().state_, actionlib::SimpleClientGoalState::PREEMPTED);
-}
-
-TEST_F(HomingTest, StopsWhenTimeGoesBack)
-{
-  drive();
-  expectToStop([this] { base_.delay = 5.0; }, ServoStatus::ABORTED, "gone back");
-  EXPECT_FALSE(result().success);
+  expectToStop([this] { robot_.black = true; }, ServoStatus::LOST, "shows nothing");
+  robot_.black = false;
+  expectToGoOn();
 }
 
 TEST_F(HomingTest, StopsForMatchesOfAnotherView)
 {
   drive();
-  expectToStop([this] { base_.other_view = true; }, ServoStatus::LOST, "no matches");
+  expectToStop([this] { robot_.other_view = true; }, ServoStatus::LOST, "are of view 'another', not of 'goal'");
 }
 
-TEST_F(HomingTest, StopsBeforeItEnds)
+TEST_F(HomingTest, StopsWithoutACalibration)
 {
-  const TemporaryDirectory directory;
-  FakeBase base(*scene_, "ending");
-  const Commands commands("ending/cmd_vel");
-  const Recorder<ServoStatus> status("ending/status");
-  ChildProcess node({ HOMING_PATH, "__ns:=ending", "_views_dir:=" + viewsDir("driving/homing").string() },
-                    directory.path() / "output");
-  ASSERT_TRUE(waitForService("ending/homing/enable")) << node.output();
-  std_srvs::SetBool service;
-  service.request.data = 1;
-  ASSERT_TRUE(ros::service::call("ending/homing/enable", service));
-  ActionClient client("ending/home", false);
-  ASSERT_TRUE(waitUntil([&] { return client.isServerConnected(); }));
+  drive();
+  expectToStop([this] { robot_.calibrated = false; }, ServoStatus::LOST, "not calibrated");
+}
+
+TEST_F(HomingTest, RefusesAStepThatIsNone)
+{
   HomeToViewGoal goal;
   goal.view = "goal";
-  bool sent = false;
-  ASSERT_TRUE(waitUntil([&] {
-    if (!sent || client.getState().isDone())
-    {
-      client.sendGoal(goal);
-      sent = true;
-    }
-    return commands.moving();
-  })) << node.output();
-  const Clock::time_point moment = Clock::now();
-  node.interrupt();
-  EXPECT_EQ(node.exitStatus(), 0) << node.output();
-  EXPECT_TRUE(waitUntil([&] { return !commands.moving(); }));
-  EXPECT_LT(commands.lastMotionAfter(moment), STOPS_WITHIN);
-  EXPECT_EQ(status.last()->reason, "the node is shutting down");
-}
-
-TEST_F(HomingTest, RefusesWhatItCannotDo)
-{
-  drive();
-  client_.cancelGoal();
-  result();
-  const auto refused = [this](const std::string& words) {
-    const HomeToViewResult final = result();
-    EXPECT_FALSE(final.success);
-    EXPECT_NE(final.message.find(words), std::string::npos) << final.message;
-    EXPECT_TRUE(std::isnan(final.final.heading));
-    EXPECT_FALSE(commands_.moving());
-  };
-  send("unknown");
-  refused("unknown");
-  send("");
-  refused("names no view");
-  send("goal", std::numeric_limits<double>::quiet_NaN());
-  refused("finite");
-  send("goal", 60.0, -1.0);
-  refused("negative");
-  enable(false);
-  send("goal");
-  refused("disabled");
-}
-
-TEST_F(HomingTest, GivesUpInTime)
-{
-  drive();
-  send("goal", 1.0);  // replaces the other
+  goal.step = -1.0;
+  client_.sendGoal(goal);
   const HomeToViewResult final = result();
   EXPECT_FALSE(final.success);
-  EXPECT_NE(final.message.find("not arrived within 1 s"), std::string::npos) << final.message;
-  EXPECT_GE(final.duration, 1.0);
-  EXPECT_TRUE(waitUntil([this] { return !commands_.moving(); }));
+  EXPECT_NE(final.message.find("negative"), std::string::npos) << final.message;
+  EXPECT_TRUE(std::isnan(final.final.heading));
+  send("");
+  EXPECT_NE(result().message.find("names no view"), std::string::npos);
 }
 
-class DryHomingTest : public HomingTest
+class DryHomingTest : public DriverTest<FakeBase>
 {
 protected:
-  DryHomingTest() : HomingTest("dry"), dry_commands_("dry/cmd_vel_dry")
+  DryHomingTest() : DriverTest("dry", "cmd_vel_dry")
   {
   }
 
-  Commands dry_commands_;
+  Commands real_commands_{ "dry/cmd_vel" };
+  Recorder<Heading> headings_{ "dry/heading" };
 };
 
 TEST_F(DryHomingTest, WatchesItsViewAndKeepsCommandsToItself)
 {
   // Without any goal.
   EXPECT_TRUE(waitUntil([this] { return headings_.last() && std::isfinite(headings_.last()->heading); }));
-  EXPECT_FALSE(dry_commands_.moving());
+  EXPECT_FALSE(commands_.moving());
   enable(false);
   send("");
-  EXPECT_TRUE(waitUntil([this] { return dry_commands_.moving(); })) << reason();
-  EXPECT_FALSE(commands_.any());
+  EXPECT_TRUE(waitUntil([this] { return commands_.moving(); })) << reason();
+  EXPECT_FALSE(real_commands_.any());
 }
 
 }  // namespace
@@ -445,5 +329,11 @@ TEST_F(DryHomingTest, WatchesItsViewAndKeepsCommandsToItself)
 
 int main(int argc, char** argv)
 {
-  return view_servo::test::runTests(argc, argv, "homing_test");
+  using view_servo::test::scene;
+  return view_servo::test::runDriverTests(argc, argv, "homing_test", "driving/homing", [] {
+    view_servo::StoredView view;
+    view.name = "goal";
+    view.image = scene().view;
+    return view;
+  });
 }

@@ -1,0 +1,272 @@
+// Copyright (c) 2026, the view_servo authors
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include "driver_test.h"
+
+namespace view_servo
+{
+namespace test
+{
+/** @file What every driver must do, whatever its robot is: instantiated by the test of each. */
+
+template <typename Robot>
+class DriverCases : public DriverTest<Robot>
+{
+};
+
+TYPED_TEST_SUITE_P(DriverCases);
+
+using actionlib::SimpleClientGoalState;
+
+// ------------------------------------------------------------------------------------------------- while it prepares
+
+TYPED_TEST_P(DriverCases, WaitsForAPeerThatAnswersLate)
+{
+  this->prepareInVain();
+  EXPECT_FALSE(this->commands_.moving());
+  this->robot_.answers = true;
+  this->expectToGoOn();
+}
+
+TYPED_TEST_P(DriverCases, EndsInTimeWhenThePeerNeverAnswers)
+{
+  this->prepareInVain(1.5);
+  const auto final = this->result();
+  EXPECT_FALSE(final.success);
+  EXPECT_NE(final.message.find("not begun within 1.5 s"), std::string::npos) << final.message;
+  EXPECT_NE(final.message.find(TypeParam::SILENT), std::string::npos) << final.message;
+  EXPECT_LT(final.duration, 2.0);
+}
+
+TYPED_TEST_P(DriverCases, IsCancelledWhileItPrepares)
+{
+  this->prepareInVain();
+  this->expectToEnd([this] { this->client_.cancelGoal(); }, SimpleClientGoalState::PREEMPTED, "cancelled");
+  EXPECT_TRUE(this->robot_.wantedView().view.empty() ||
+              waitUntil([this] { return this->robot_.wantedView().view.empty(); }));
+}
+
+TYPED_TEST_P(DriverCases, IsDisabledWhileItPrepares)
+{
+  this->prepareInVain();
+  this->expectToEnd([this] { this->enable(false); }, SimpleClientGoalState::ABORTED, "disabled");
+  EXPECT_EQ(this->status_.last()->state, ServoStatus::DISABLED);
+}
+
+TYPED_TEST_P(DriverCases, IsReplacedWhileItPrepares)
+{
+  this->prepareInVain();
+  typename TestFixture::Client other(this->ns_ + "/" + TypeParam::ACTION, false);
+  ASSERT_TRUE(waitUntil([&] { return other.isServerConnected(); }));
+  typename TestFixture::Goal goal;
+  goal.view = "goal";
+  this->expectToEnd([&] { other.sendGoal(goal); }, SimpleClientGoalState::PREEMPTED, "another goal has come");
+  this->robot_.refuses = true;
+  this->robot_.answers = true;
+  EXPECT_TRUE(waitUntil([&] { return other.getState().isDone(); }));
+  EXPECT_NE(other.getState().getText().find("it is too dark"), std::string::npos) << other.getState().getText();
+}
+
+TYPED_TEST_P(DriverCases, EndsItsProcessWhileItPrepares)
+{
+  typename TestFixture::OtherDriver other(this->viewsDirectory());
+  other.robot.answers = false;
+  other.send("goal");
+  ASSERT_TRUE(waitUntil([&] {
+    return other.status.last() && other.status.last()->reason.find(TypeParam::SILENT) != std::string::npos;
+  })) << other.node.output();
+  other.expectToEnd([&] { other.node.interrupt(); });
+}
+
+TYPED_TEST_P(DriverCases, RefusesAViewThatItsPeerRefuses)
+{
+  this->robot_.refuses = true;
+  this->send("goal");
+  const auto final = this->result();
+  EXPECT_FALSE(final.success);
+  EXPECT_NE(final.message.find("it is too dark"), std::string::npos) << final.message;
+}
+
+TYPED_TEST_P(DriverCases, RefusesAViewThatIsNotThere)
+{
+  this->expectToEnd([this] { this->send("unknown"); }, SimpleClientGoalState::ABORTED, "unknown", 2.0);
+}
+
+TYPED_TEST_P(DriverCases, RefusesWhenDisabled)
+{
+  this->enable(false);
+  this->expectToEnd([this] { this->send("goal"); }, SimpleClientGoalState::ABORTED, "call ~enable", 2.0);
+}
+
+TYPED_TEST_P(DriverCases, RefusesTimesThatAreNone)
+{
+  this->send("goal", std::numeric_limits<double>::quiet_NaN());
+  EXPECT_NE(this->result().message.find("finite"), std::string::npos);
+  this->send("goal", -1.0);
+  EXPECT_NE(this->result().message.find("negative"), std::string::npos);
+}
+
+// ---------------------------------------------------------------------------------------------------- while it drives
+
+TYPED_TEST_P(DriverCases, StopsWhenDisabled)
+{
+  this->drive();
+  this->expectToEnd([this] { this->enable(false); }, SimpleClientGoalState::ABORTED, "disabled");
+  EXPECT_EQ(this->status_.last()->state, ServoStatus::DISABLED);
+}
+
+TYPED_TEST_P(DriverCases, StopsWhenTheGoalIsCancelled)
+{
+  this->drive();
+  this->expectToEnd([this] { this->client_.cancelGoal(); }, SimpleClientGoalState::PREEMPTED, "cancelled");
+}
+
+TYPED_TEST_P(DriverCases, StopsForAnotherGoal)
+{
+  this->drive();
+  typename TestFixture::Client other(this->ns_ + "/" + TypeParam::ACTION, false);
+  ASSERT_TRUE(waitUntil([&] { return other.isServerConnected(); }));
+  typename TestFixture::Goal goal;
+  goal.view = "unknown";
+  this->expectToEnd([&] { other.sendGoal(goal); }, SimpleClientGoalState::PREEMPTED, "another goal has come");
+  EXPECT_TRUE(waitUntil([&] { return other.getState().isDone(); }));
+}
+
+TYPED_TEST_P(DriverCases, StopsBeforeItsProcessEnds)
+{
+  for (const bool by_signal_of_a_person : { true, false })
+  {
+    typename TestFixture::OtherDriver other(this->viewsDirectory());
+    other.send("goal");
+    ASSERT_TRUE(waitUntil([&] { return other.commands.moving(); })) << other.node.output();
+    other.expectToEnd([&] { by_signal_of_a_person ? other.node.interrupt() : other.node.terminate(); });
+  }
+}
+
+TYPED_TEST_P(DriverCases, GivesUpInTime)
+{
+  this->drive();
+  this->send("goal", 1.0);  // replaces the other
+  const auto final = this->result();
+  EXPECT_FALSE(final.success);
+  EXPECT_NE(final.message.find("within 1 s"), std::string::npos) << final.message;
+  EXPECT_GE(final.duration, 1.0);
+}
+
+TYPED_TEST_P(DriverCases, StopsWhenThePeerFallsSilentAndGoesOnWithIt)
+{
+  this->drive();
+  this->expectToStop([this] { this->robot_.answers = false; }, ServoStatus::LOST, TypeParam::SILENT);
+  this->robot_.answers = true;
+  this->expectToGoOn();
+}
+
+TYPED_TEST_P(DriverCases, GivesUpWhenThePeerStaysSilent)
+{
+  this->drive();
+  this->robot_.answers = false;
+  const auto final = this->result();
+  EXPECT_FALSE(final.success);
+  EXPECT_NE(final.message.find(TypeParam::SILENT), std::string::npos) << final.message;
+}
+
+TYPED_TEST_P(DriverCases, StopsWhenTimeGoesBack)
+{
+  this->drive();
+  this->expectToEnd([this] { this->robot_.delay = 5.0; }, SimpleClientGoalState::ABORTED, "gone back");
+}
+
+TYPED_TEST_P(DriverCases, StopsForStampsThatStandStill)
+{
+  this->drive();
+  this->expectToStop([this] { this->robot_.frozen = true; }, ServoStatus::LOST, "stand still");
+  this->robot_.frozen = false;
+  this->expectToGoOn();
+}
+
+TYPED_TEST_P(DriverCases, StopsForStampsThatAreZero)
+{
+  this->drive();
+  this->expectToStop([this] { this->robot_.unstamped = true; }, ServoStatus::LOST, "no stamp");
+  const auto final = this->result();
+  EXPECT_FALSE(final.success);
+  EXPECT_NE(final.message.find("no stamp"), std::string::npos) << final.message;
+}
+
+TYPED_TEST_P(DriverCases, StopsWhenTheCalibrationChanges)
+{
+  this->drive();
+  this->expectToEnd([this] { this->robot_.focal_length = 510.0; }, SimpleClientGoalState::ABORTED,
+                    "calibration has changed", 2.0 * STOPS_WITHIN);
+}
+
+TYPED_TEST_P(DriverCases, StopsWhenNobodyFollowsAnyMore)
+{
+  this->drive();
+  this->commands_.shutdown();
+  EXPECT_TRUE(waitUntil([this] { return this->client_.getState().isDone(); })) << this->reason();
+  EXPECT_NE(this->client_.getState().getText().find("nobody listens any more"), std::string::npos)
+      << this->client_.getState().getText();
+  this->send("goal", 1.5);
+  const auto final = this->result();
+  EXPECT_FALSE(final.success);
+  EXPECT_NE(final.message.find("nobody listens on"), std::string::npos) << final.message;
+}
+
+TYPED_TEST_P(DriverCases, SurvivesWhateverIsInMessages)
+{
+  this->robot_.publishExtremes();  // without a goal
+  this->drive();
+  this->robot_.publishExtremes();  // with one: it may end it, by a reason
+  this->client_.cancelAllGoals();
+  EXPECT_TRUE(waitUntil([this] { return this->client_.getState().isDone(); })) << this->reason();
+  EXPECT_FALSE(this->client_.getState().getText().empty());
+  EXPECT_TRUE(waitUntil([this] { return !this->commands_.moving(); }));
+  this->drive();  // and it goes on
+}
+
+TYPED_TEST_P(DriverCases, TakesManyGoalsWhilePeersComeAndGo)
+{
+  const char* wanted = std::getenv("VIEW_SERVO_GOALS");
+  const int goals = wanted != nullptr ? std::atoi(wanted) : 200;
+  for (int i = 0; i < goals && !this->HasFatalFailure(); ++i)
+  {
+    if (i % 5 == 0)
+    {
+      this->robot_.reconnect();
+    }
+    this->robot_.answers = i % 3 != 0;
+    this->send("goal", i % 7 == 0 ? 0.05 : 60.0);
+    if (i % 2 == 0)
+    {
+      this->client_.cancelGoal();
+    }
+    else if (i % 7 != 0)
+    {
+      ASSERT_TRUE(waitUntil([this] { return this->client_.getState() != SimpleClientGoalState::PENDING; })) << i;
+      this->client_.cancelGoal();
+    }
+    ASSERT_TRUE(waitUntil([this] { return this->client_.getState().isDone(); }))
+        << "goal " << i << ": " << this->reason();
+    // One that is cancelled before the driver could see it is ended by actionlib itself, without a word.
+    const SimpleClientGoalState state = this->client_.getState();
+    const bool seen = state != SimpleClientGoalState::RECALLED && state != SimpleClientGoalState::LOST;
+    ASSERT_TRUE(!seen || !state.getText().empty()) << "goal " << i << ": " << state.toString();
+  }
+  this->robot_.answers = true;
+  this->drive();
+}
+
+REGISTER_TYPED_TEST_SUITE_P(DriverCases, WaitsForAPeerThatAnswersLate, EndsInTimeWhenThePeerNeverAnswers,
+                            IsCancelledWhileItPrepares, IsDisabledWhileItPrepares, IsReplacedWhileItPrepares,
+                            EndsItsProcessWhileItPrepares, RefusesAViewThatItsPeerRefuses, RefusesAViewThatIsNotThere,
+                            RefusesWhenDisabled, RefusesTimesThatAreNone, StopsWhenDisabled,
+                            StopsWhenTheGoalIsCancelled, StopsForAnotherGoal, StopsBeforeItsProcessEnds, GivesUpInTime,
+                            StopsWhenThePeerFallsSilentAndGoesOnWithIt, GivesUpWhenThePeerStaysSilent,
+                            StopsWhenTimeGoesBack, StopsForStampsThatStandStill, StopsForStampsThatAreZero,
+                            StopsWhenTheCalibrationChanges, StopsWhenNobodyFollowsAnyMore, SurvivesWhateverIsInMessages,
+                            TakesManyGoalsWhilePeersComeAndGo);
+
+}  // namespace test
+}  // namespace view_servo
