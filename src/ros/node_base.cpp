@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cstdlib>  // says whether this is glibc
 #include <sstream>
+#include <utility>
 
 #ifdef __GLIBC__
 #include <malloc.h>
@@ -46,6 +47,13 @@ double secondsBetween(const ros::Time& from, const ros::Time& to)
 double ageOf(const ros::Time& stamp)
 {
   return secondsBetween(stamp, ros::Time::now());
+}
+
+std::string timeJump(ros::Time& last, const ros::Time& stamp, const std::string& what)
+{
+  constexpr double TOLERANCE = 0.5;  // [s]
+  const double back = secondsBetween(stamp, std::exchange(last, stamp));
+  return back > TOLERANCE ? "time has gone back by " + seconds(back) + " in " + what : "";
 }
 
 void keepFreedMemory()

@@ -15,7 +15,7 @@ Rectifier::Rectifier(const sensor_msgs::CameraInfo& info) : info_(info)
 {
   if (!isCalibrated(info))
   {
-    throw std::runtime_error("the camera is not calibrated: K is all zero");
+    throw std::runtime_error("the camera is not calibrated: K is all zero, or a number is not finite");
   }
   model_.fromCameraInfo(info);
   active_ = std::any_of(info.D.begin(), info.D.end(), [](double coefficient) { return coefficient != 0.0; });

@@ -59,6 +59,9 @@ public:
   /** @throws ImageError, saying why, when there is no usable frame or it is too old. */
   CameraFrame latest() const;
 
+  /** Why the newest image cannot be used with its calibration, whatever it shows; empty: it can, or none came. */
+  std::string fault() const;
+
   /** Where images come from, resolved. */
   std::string imageTopic() const
   {
@@ -70,6 +73,7 @@ public:
 private:
   void frameCallback(const sensor_msgs::ImageConstPtr& image, const sensor_msgs::CameraInfoConstPtr& info);
   void take(const sensor_msgs::ImageConstPtr& image, const sensor_msgs::CameraInfoConstPtr& info);
+  std::string faultOf(const sensor_msgs::Image& image, const sensor_msgs::CameraInfo& info) const;
   void checkInputs();
   std::string topics() const;
 
@@ -77,6 +81,7 @@ private:
   Callback on_frame_;
   mutable std::mutex mutex_;
   CameraFrame latest_;
+  std::string fault_;    // of the last pair
   std::string problem_;  // why the last frame was not usable, or none came
   int images_ = 0;       // since the last check
   int infos_ = 0;
