@@ -246,6 +246,7 @@ private:
       {
         task = { choice_.chosen(), task_number_ };
         session_ = std::move(prepared_);
+        last_frame_ = Clock::now();
         ++era_;
       }
       const std::optional<CameraFrame> frame = std::exchange(newest_, std::nullopt);
@@ -273,9 +274,11 @@ private:
         return;
       }
       session_ = std::move(preparation.session);
+      last_frame_ = Clock::now();
     }
     if (frame)
     {
+      last_frame_ = Clock::now();
       const std::string fault = guarded("an image on '" + camera_.imageTopic() + "'", [&] { process(task, *frame); });
       if (!fault.empty())
       {
@@ -285,6 +288,10 @@ private:
     else if (const std::string fault = camera_.fault(); !fault.empty())
     {
       report(task, fault, true);
+    }
+    else if (Clock::now() > last_frame_ + NO_IMAGE_AFTER)
+    {
+      report(task, "no image comes on '" + camera_.imageTopic() + "'", false);
     }
   }
 
@@ -373,7 +380,7 @@ private:
     if (!news.empty())
     {
       status_.reason = news;
-      ROS_INFO_STREAM_THROTTLE(5.0, "view '" << task.chosen.view << "' is not found: " << news);
+      ROS_INFO_STREAM_THROTTLE(5.0, "view '" << task.chosen.view << "' is not tracked: " << news);
     }
     return status_.reason;
   }
@@ -425,6 +432,7 @@ private:
   }
 
   static constexpr std::chrono::milliseconds REPORT_PERIOD{ 500 };
+  static constexpr std::chrono::seconds NO_IMAGE_AFTER{ 2 };
   static constexpr const char* LOOKS_FOR_IT = "looks for the view";
 
   const Params params_;
@@ -445,7 +453,8 @@ private:
   // The follower's own.
   PlaneSearcher searcher_;
   std::unique_ptr<PlaneSession> session_;
-  std::uint64_t era_ = 0;  // another one for each session, and when time goes back
+  Clock::time_point last_frame_;  // or when the session began
+  std::uint64_t era_ = 0;         // another one for each session, and when time goes back
   struct
   {
     std::uint64_t number = 0;

@@ -7,6 +7,7 @@
 
 #include <algorithm>
 #include <cstddef>
+#include <stdexcept>
 #include <utility>
 
 namespace view_servo
@@ -19,6 +20,10 @@ PlaneSession::PlaneSession(std::shared_ptr<const PreparedImage> view, const sens
     reference_(rectifier_.image(view_->grey())),
     region_(rectifier_.region(view_->region()))
 {
+  if (region_.empty())
+  {
+    throw std::runtime_error("the view's region is not in the image without the camera's distortion");
+  }
   reset();
 }
 

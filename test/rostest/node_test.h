@@ -22,6 +22,7 @@
 #include <deque>
 #include <filesystem>
 #include <functional>
+#include <limits>
 #include <mutex>
 #include <optional>
 #include <stdexcept>
@@ -287,7 +288,7 @@ inline std::vector<CameraMessages> oddMessages(const FakeCamera& camera, const c
     messages.image.width = messages.info.width = 4294967295U;
     messages.image.height = messages.info.height = 4294967295U;
   });
-  for (const double number : { std::nan(""), INFINITY, -1.0, 1e308 })
+  for (const double number : { std::nan(""), std::numeric_limits<double>::infinity(), -1.0, 1e308 })
   {
     change("K", [&](CameraMessages& messages) { messages.info.K[0] = number; });
     change("K's middle", [&](CameraMessages& messages) { messages.info.K[2] = number; });

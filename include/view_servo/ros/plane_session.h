@@ -28,7 +28,7 @@ namespace view_servo
 class PlaneSession
 {
 public:
-  /** @throws what Rectifier and PlaneTracker throw. */
+  /** @throws what Rectifier and PlaneTracker throw, std::runtime_error when nothing is left of the rectified region. */
   PlaneSession(std::shared_ptr<const PreparedImage> view, const sensor_msgs::CameraInfo& info,
                const PlaneTrackerParams& params);
 
