@@ -17,6 +17,7 @@ PlaneSearcher::PlaneSearcher(const PlaneFinder& finder, double period)
 
 PlaneSearcher::~PlaneSearcher()
 {
+  stopping_ = true;
   questions_.close();
   worker_.join();
 }
@@ -44,7 +45,9 @@ void PlaneSearcher::work()
 {
   while (std::optional<Search> search = questions_.wait())
   {
-    const std::string fault = guarded("looking for the view", [&] { search->answer = finder_.find(search->question); });
+    const std::string fault = guarded("looking for the view", [&] {
+      search->answer = finder_.find(search->question, [this] { return stopping_.load(); });
+    });
     if (!fault.empty())
     {
       search->answer.reason = fault;

@@ -95,7 +95,7 @@ ViewMatch PlaneFinder::match(const PreparedImage& view, const cv::Mat& image) co
   return matcher_.match(view, PreparedImage(image, cv::Rect(), features()), GeometryModel::HOMOGRAPHY);
 }
 
-PlaneFinder::Answer PlaneFinder::find(const Question& question) const
+PlaneFinder::Answer PlaneFinder::find(const Question& question, const std::function<bool()>& given_up) const
 {
   const PreparedImage& view = *question.view;
   if (view.grey().size() != question.image.size())
@@ -113,6 +113,10 @@ PlaneFinder::Answer PlaneFinder::find(const Question& question) const
   if (is_expected(first))
   {
     return toAnswer(first);
+  }
+  if (given_up && given_up())
+  {
+    return notFound("the search was given up");
   }
   const ViewMatch second = match(view, withoutRegion(question.image, view.region(), first.matrix));
   const bool rivals = second.outcome == MatchOutcome::MATCHED && second.inliers >= RIVALRY * first.inliers &&

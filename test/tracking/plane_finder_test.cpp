@@ -134,6 +134,14 @@ TEST_F(PlaneFinderTest, SaysWhatIsWrongWithAnImage)
   EXPECT_THROW(find(cv::Mat(SIZE, CV_8UC3, cv::Scalar(0))), std::invalid_argument);
 }
 
+TEST_F(PlaneFinderTest, CanBeGivenUp)
+{
+  const auto given_up = [] {
+    return true;
+  };
+  expectNotFound("given up", finder_.find({ view_, warpedPicture(picture_, left_, SIZE), std::nullopt }, given_up));
+}
+
 TEST_F(PlaneFinderTest, SaysWhatIsWrongWithAView)
 {
   const cv::Mat black(SIZE, CV_8UC1, cv::Scalar(0));

@@ -7,6 +7,7 @@
 
 #include <Eigen/Geometry>
 
+#include <atomic>
 #include <chrono>
 #include <cstdint>
 #include <optional>
@@ -31,7 +32,7 @@ public:
 
   /** @param period from one search to the next [s]. @param finder must outlive this. */
   PlaneSearcher(const PlaneFinder& finder, double period);
-  /** Waits for the search that is under way. */
+  /** Waits for the match that is under way. */
   ~PlaneSearcher();
   PlaneSearcher(const PlaneSearcher&) = delete;
   PlaneSearcher& operator=(const PlaneSearcher&) = delete;
@@ -53,6 +54,7 @@ private:
   const Clock::duration period_;
   bool searching_ = false;
   Clock::time_point next_;
+  std::atomic<bool> stopping_{ false };
   Mailbox<Search> questions_;
   Mailbox<Search> answers_;
   std::thread worker_;

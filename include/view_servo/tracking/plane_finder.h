@@ -9,6 +9,7 @@
 #include <Eigen/Core>
 #include <opencv2/core/mat.hpp>
 
+#include <functional>
 #include <memory>
 #include <optional>
 #include <string>
@@ -45,8 +46,11 @@ public:
     return matcher_.params().points;
   }
 
-  /** @throws std::invalid_argument when the image has the wrong type. */
-  Answer find(const Question& question) const;
+  /**
+   * @param given_up asked between the matches that it takes; once it holds, nothing is found. May be empty.
+   * @throws std::invalid_argument when the image has the wrong type.
+   */
+  Answer find(const Question& question, const std::function<bool()>& given_up = {}) const;
 
 private:
   ViewMatch match(const PreparedImage& view, const cv::Mat& image) const;
