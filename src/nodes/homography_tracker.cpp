@@ -1,37 +1,31 @@
 // Copyright (c) 2026, the view_servo authors
 // SPDX-License-Identifier: BSD-3-Clause
 #include "view_servo/Homography.h"
-#include "view_servo/MatchPoints.h"
 #include "view_servo/SetView.h"
-#include "view_servo/geometry/homography.h"
 #include "view_servo/ros/camera_input.h"
 #include "view_servo/ros/conversions.h"
-#include "view_servo/ros/image_source.h"
 #include "view_servo/ros/node_base.h"
-#include "view_servo/ros/rectifier.h"
-#include "view_servo/tracking/homography_tracker_parameters.h"
+#include "view_servo/ros/parameters.h"
+#include "view_servo/ros/plane_searcher.h"
+#include "view_servo/ros/plane_session.h"
+#include "view_servo/ros/session_starter.h"
+#include "view_servo/ros/view_choice.h"
+#include "view_servo/tracking/plane_finder.h"
 #include "view_servo/tracking/plane_tracker.h"
-#include "view_servo/views/image_io.h"
-#include "view_servo/views/overlay.h"
 #include "view_servo/views/view_store.h"
 
 #include <image_transport/image_transport.h>
 #include <ros/publisher.h>
-#include <ros/service.h>
+#include <ros/subscriber.h>
 #include <sensor_msgs/image_encodings.h>
 #include <std_srvs/Trigger.h>
-#include <tf2_ros/buffer.h>
-#include <tf2_ros/transform_listener.h>
 #include <Eigen/Geometry>
-#include <opencv2/imgproc.hpp>
 
 #include <algorithm>
-#include <array>
+#include <atomic>
 #include <chrono>
-#include <cmath>
 #include <condition_variable>
 #include <cstdint>
-#include <filesystem>
 #include <limits>
 #include <memory>
 #include <mutex>
@@ -40,7 +34,6 @@
 #include <string>
 #include <thread>
 #include <utility>
-#include <vector>
 
 namespace view_servo
 {
@@ -51,140 +44,42 @@ using Clock = std::chrono::steady_clock;
 struct Params
 {
   CameraInputParams camera;
-  std::filesystem::path views_dir;
+  SessionStarterParams sessions;
   std::string view;
-  std::string odom_frame = "base_link";
-  double tf_patience = 0.05;
-  std::string point_matcher = "point_matcher";
   double match_period = 0.3;
-  PlaneTrackerParams tracker;
+  ViewMatcherParams matching;
 
   static Params read(const ros::NodeHandle& private_nh)
   {
     Params params;
     ParameterReader reader(private_nh);
     params.camera = CameraInputParams::read(reader);
-    params.views_dir = readViewsDir(reader);
+    params.sessions = SessionStarterParams::read(reader);
     reader.read("view", params.view);
     reader.require(params.view.empty() || isValidViewName(params.view),
                    "~view: '" + params.view + "' is not a view's name");
-    reader.read("odom_frame", params.odom_frame);
-    reader.read("tf_patience", params.tf_patience);
-    reader.require(params.tf_patience >= 0.0, "~tf_patience must not be negative [s]");
-    reader.read("point_matcher", params.point_matcher);
-    reader.require(!params.point_matcher.empty(), "~point_matcher must not be empty");
     reader.read("match_period", params.match_period);
     reader.require(params.match_period > 0.0, "~match_period must be more than 0 s");
-    reader.read(homographyTrackerParameters(params.tracker));
-    reader.addFaults(params.tracker.validate());
+    params.matching = readMatcherParams(reader, "matching");
     reader.finish();
     return params;
   }
 };
 
-Eigen::Vector2d middleOf(const cv::Rect& rect)
+/** What is to be followed. */
+struct Task
 {
-  return { rect.x + 0.5 * (rect.width - 1), rect.y + 0.5 * (rect.height - 1) };
-}
-
-/** A view that is followed. Only the thread that follows uses what is not const. */
-struct Session
-{
-  Session(const StoredView& stored, const sensor_msgs::CameraInfo& info, const PlaneTrackerParams& params)
-    : view(stored.name),
-      raw_region(stored.region.empty() ? cv::Rect(cv::Point(), stored.image.size()) : stored.region),
-      rectifier(info),
-      reference(rectifier.image(stored.image)),
-      region(rectifier.region(raw_region))
-  {
-    reset(params);
-  }
-
-  /** Forgets what was found. */
-  void reset(const PlaneTrackerParams& params)
-  {
-    tracker = std::make_unique<PlaneTracker>(reference, region, rectifier.k(), params);
-    last_stamp = ros::Time();
-    last_h.reset();
-    path.clear();
-  }
-
-  /** Where the middle of the region is now. */
-  void addToPath()
-  {
-    constexpr std::size_t LONGEST = 300;
-    path.push_back(transfer(*last_h, middleOf(region)));
-    if (path.size() > LONGEST)
-    {
-      path.erase(path.begin());
-    }
-  }
-
-  const std::string view;
-  const cv::Rect raw_region;
-  const Rectifier rectifier;
-  const cv::Mat reference;  // without distortion, as all that follows
-  const cv::Rect region;
-  std::unique_ptr<PlaneTracker> tracker;
-  ros::Time last_stamp;
-  std::optional<Eigen::Matrix3d> last_h;  // where the plane was tracked last
-  Points path;                            // of the region's middle, the point that servo_25d leads [px]
+  ChosenView chosen;
+  std::uint64_t number = 0;  // another one for each choice
 };
 
-/** What the point matcher is asked for: where the view is in an image. */
-struct Question
+/** For diagnostics. */
+struct Status
 {
-  std::uint64_t generation;
-  std::string view;
-  cv::Rect region;
-  sensor_msgs::ImageConstPtr image;
-  std::optional<Eigen::Isometry3d> camera_in_odom;
-  std::optional<Eigen::Matrix3d> last_h;
+  TrackingState state = TrackingState::SEARCHING;
+  std::string reason = "no view is followed";
+  int points = 0;
 };
-
-/** What it has answered. */
-struct Answer
-{
-  std::uint64_t generation;
-  std::optional<Eigen::Matrix3d> h;  // raw pixels; empty: not found
-  Correspondences inliers;           // raw pixels
-  std::string reason;                // why it was not found
-  std::optional<Eigen::Isometry3d> camera_in_odom;
-};
-
-/** The corners of a rectangle of pixels, moved by a homography; NaN beyond the horizon. */
-std::array<Eigen::Vector2d, 4> movedCorners(const cv::Rect& rect, const Eigen::Matrix3d& h)
-{
-  const double right = rect.x + rect.width - 1.0;
-  const double bottom = rect.y + rect.height - 1.0;
-  return { transfer(h, Eigen::Vector2d(rect.x, rect.y)), transfer(h, Eigen::Vector2d(right, rect.y)),
-           transfer(h, Eigen::Vector2d(right, bottom)), transfer(h, Eigen::Vector2d(rect.x, bottom)) };
-}
-
-/** Whether two homographies show a region in different places: their middles are apart by half its size. */
-bool isElsewhere(const cv::Rect& region, const Eigen::Matrix3d& h, const Eigen::Matrix3d& other)
-{
-  const Eigen::Vector2d centre = middleOf(region);
-  const std::array<Eigen::Vector2d, 4> corners = movedCorners(region, h);
-  const double size = 0.5 * ((corners[2] - corners[0]).norm() + (corners[3] - corners[1]).norm());
-  return !((transfer(h, centre) - transfer(other, centre)).norm() < 0.25 * size);
-}
-
-/** The image with the region painted over where a homography shows it. */
-cv::Mat withoutRegion(const cv::Mat& grey, const cv::Rect& region, const Eigen::Matrix3d& h)
-{
-  std::vector<cv::Point> polygon;
-  for (const Eigen::Vector2d& corner : movedCorners(region, h))
-  {
-    const Eigen::Vector2d at = corner.cwiseMax(-1e4).cwiseMin(1e4);
-    polygon.emplace_back(cvRound(at.x()), cvRound(at.y()));
-  }
-  cv::Mat mask(grey.size(), CV_8UC1, cv::Scalar(0));
-  cv::fillConvexPoly(mask, polygon, cv::Scalar(255));
-  cv::Mat painted = grey.clone();
-  painted.setTo(cv::mean(grey, mask), mask);
-  return painted;
-}
 
 std::string nameOf(TrackingState state)
 {
@@ -194,34 +89,35 @@ std::string nameOf(TrackingState state)
 }  // namespace
 
 /**
- * Follows the plane of a stored view through the images of a moving camera, and tells its homography, the camera's motion
+ * Follows the plane of a stored view through the images of a moving camera, and publishes its homography, the camera's motion
  * from the view and the plane itself. Parameters, all private; config/homography_tracker.yaml has them with their ranges:
- *  - `~view` (string, default ""): stored view that is followed as soon as there are images, without ~start;
- *  - `~views_dir` (string): as in view_store;
- *  - `~odom_frame` (string, default "base_link"): frame that does not jump, which tf knows the camera's frame in; "": none;
- *  - `~tf_patience` (double, default 0.05 [s]): time that an image waits for tf;
- *  - `~point_matcher` (string, default "point_matcher"): node whose `~match` finds the view anew;
- *  - `~match_period` (double, default 0.3 [s]): between two requests to it;
- *  - `~image_transport`, `~queue_size`, `~max_image_age`: see CameraInput;
- *  - those of tracking, see homographyTrackerParameters().
+ *  - `~view` (string, default ""): stored view that is followed from the start;
+ *  - `~views_dir`, `~odom_frame`, `~tf_patience` and those of tracking: see SessionStarter;
+ *  - `~match_period` (double, default 0.3 [s]): from one search for the view to the next;
+ *  - `~matching/...`: how the view is found, see matcherParameters();
+ *  - `~image_transport`, `~queue_size`, `~max_image_age`: see CameraInput.
  *
  * Subscribes:
- *  - `image_raw`, `camera_info`: see CameraInput; tf.
+ *  - `image_raw`, `camera_info`: see CameraInput; tf;
+ *  - `wanted_view` (view_servo/WantedView): the view that a driver wants followed; an empty one ends that.
  *
  * Publishes:
- *  - `homography` (view_servo/Homography): for each image, with its header. Pixels are those of the images as they come, or,
- *    when camera_info has distortion, of rectified ones, with P's K;
- *  - `overlay` (sensor_msgs/Image, bgr8): the view's outline and points, and the path of its middle; drawn when somebody listens;
+ *  - `~homography` (view_servo/Homography): for each image, with its header. Pixels are those of the images as they come, or,
+ *    when camera_info has distortion, of rectified ones, with P's K. While images, calibration or tf are lacking, twice a
+ *    second, stamped now, with the reason. What cannot be followed (no such view, damaged, of another size than the images,
+ *    the camera is not calibrated, or not any more as when it began) is refused, likewise;
+ *  - `~overlay` (sensor_msgs/Image, bgr8): the view's outline and points, and the path of its middle; drawn when somebody
+ *    listens;
  *  - `/diagnostics` (diagnostic_msgs/DiagnosticArray): 1 Hz, camera and tracking.
  *
  * Services:
- *  - `~start` (view_servo/SetView): follows a view from now on. Refused, and what was followed before goes on, when the view
- *    cannot be read or has another size than the images, the camera is not calibrated, tf does not know it in `~odom_frame`,
- *    or there is no point matcher;
+ *  - `~start` (view_servo/SetView): follows a view from now on, or as soon as image, calibration and tf are there. What cannot
+ *    be followed is refused, and what was followed before goes on;
  *  - `~stop` (std_srvs/Trigger).
  *
- * One thread follows and always takes the newest image; another one asks the point matcher, for as long as the plane is
- * not tracked, so that images go on meanwhile. A view that the image shows twice is not followed: nobody knows which is meant.
+ * The newest choice of ~start, ~stop and `wanted_view` counts, see ViewChoice. One thread follows and always takes the newest
+ * image; another one looks for the view by its points (PlaneFinder), for as long as the plane is not tracked, so that images go
+ * on meanwhile.
  */
 class HomographyTrackerNode : private NodeBase
 {
@@ -229,25 +125,27 @@ public:
   HomographyTrackerNode(const ros::NodeHandle& nh, const ros::NodeHandle& private_nh)
     : NodeBase(nh, private_nh),
       params_(Params::read(private_nh)),
-      match_service_(nh_.resolveName(params_.point_matcher + "/match")),
-      store_(params_.views_dir),
-      transforms_(tf_buffer_),
-      camera_(nh, params_.camera, [this](const CameraFrame& frame) { take(frame); }),
-      transport_(nh)
+      finder_(params_.matching),
+      searcher_(finder_, params_.match_period),
+      camera_(nh, params_.camera, [this](const CameraFrame& frame) { onFrame(frame); }),
+      starter_(params_.sessions, finder_.features(), camera_),
+      transport_(private_nh)
   {
-    homography_publisher_ = nh_.advertise<Homography>("homography", 5);
+    homography_publisher_ = private_nh_.advertise<Homography>("homography", 5);
     overlay_publisher_ = transport_.advertise("overlay", 1);
+    if (!params_.view.empty())
+    {
+      const std::lock_guard<std::mutex> lock(mutex_);
+      choice_.choose(params_.view);
+      begin(nullptr);
+    }
+    wanted_subscriber_ = subscribe<WantedView>("wanted_view", 5,
+                                               [this](const WantedView::ConstPtr& message) { onWantedView(*message); });
     start_service_ = serve("start", &HomographyTrackerNode::start, this);
     stop_service_ = serve("stop", &HomographyTrackerNode::stop, this);
     diagnostics_.add("camera", &camera_, &CameraInput::diagnose);
     diagnostics_.add("tracking", this, &HomographyTrackerNode::diagnose);
-    if (!params_.view.empty())
-    {
-      view_timer_ =
-          nh_.createWallTimer(ros::WallDuration(0.5), [this](const ros::WallTimerEvent&) { startWithoutBeingTold(); });
-    }
     follower_ = std::thread([this] { follow(); });
-    asker_ = std::thread([this] { ask(); });
   }
 
   ~HomographyTrackerNode()
@@ -258,118 +156,67 @@ public:
     }
     wake_.notify_all();
     follower_.join();
-    asker_.join();
   }
 
 private:
-  // ------------------------------------------------------------------------------------------------------ services
+  // ----------------------------------------------------------------------------------------------- what is followed
 
   void start(const SetView::Request& request, SetView::Response& response)
   {
-    start(request.view);
+    SessionStarter::Preparation preparation = starter_.prepare(request.view);
+    if (preparation.refused)
+    {
+      throw std::runtime_error(preparation.reason);
+    }
+    {
+      const std::lock_guard<std::mutex> lock(mutex_);
+      choice_.choose(request.view);
+      begin(std::move(preparation.session));
+    }
     response.success = true;
-    response.message = "follows view '" + request.view + "'";
+    response.message = "follows view '" + request.view + "'" +
+                       (preparation.reason.empty() ? "" : " as soon as it can: " + preparation.reason);
     ROS_INFO_STREAM(response.message);
-  }
-
-  void startWithoutBeingTold()
-  {
-    try
-    {
-      {
-        const std::lock_guard<std::mutex> lock(mutex_);
-        if (generation_ > 0)  // somebody has told
-        {
-          view_timer_.stop();
-          return;
-        }
-      }
-      start(params_.view);
-      ROS_INFO_STREAM("follows view '" << params_.view << "'");
-    }
-    catch (const std::exception& error)
-    {
-      ROS_WARN_STREAM_THROTTLE(5.0, "view '" << params_.view << "' is not followed: " << oneLine(error));
-    }
-  }
-
-  void start(const std::string& view)
-  {
-    const StoredView stored = store_.load(view);
-    const CameraFrame frame = awaitFrame();
-    if (stored.image.cols != static_cast<int>(frame.image->width) ||
-        stored.image.rows != static_cast<int>(frame.image->height))
-    {
-      throw std::runtime_error("view '" + stored.name + "' has " + std::to_string(stored.image.cols) + " x " +
-                               std::to_string(stored.image.rows) + " pixels, the camera " +
-                               std::to_string(frame.image->width) + " x " + std::to_string(frame.image->height));
-    }
-    if (!ros::service::exists(match_service_, false))
-    {
-      throw std::runtime_error("there is no " + match_service_ + " to find the view by");
-    }
-    requireOdometry(frame.image->header.frame_id);
-    auto session = std::make_shared<Session>(stored, *frame.info, params_.tracker);
-    const std::lock_guard<std::mutex> lock(mutex_);
-    begin(std::move(session));
   }
 
   void stop(const std_srvs::Trigger::Request& /*request*/, std_srvs::Trigger::Response& response)
   {
     const std::lock_guard<std::mutex> lock(mutex_);
-    response.success = true;
-    response.message = session_ ? "view '" + session_->view + "' is not followed any more" : "no view was followed";
+    const std::string view = choice_.chosen().view;
+    choice_.choose("");
     begin(nullptr);
+    response.success = true;
+    response.message = view.empty() ? "no view was followed" : "view '" + view + "' is not followed any more";
     ROS_INFO_STREAM(response.message);
   }
 
-  /** The latest image; just after the start it may take a moment. @throws ImageError as CameraInput::latest(). */
-  CameraFrame awaitFrame() const
+  void onWantedView(const WantedView& message)
   {
-    const ros::WallTime deadline = ros::WallTime::now() + ros::WallDuration(1.0);
-    while (ros::WallTime::now() < deadline)
+    const std::lock_guard<std::mutex> lock(mutex_);
+    if (choice_.want(message))
     {
-      try
-      {
-        return camera_.latest();
-      }
-      catch (const ImageError&)
-      {
-        ros::WallDuration(0.02).sleep();
-      }
-    }
-    return camera_.latest();
-  }
-
-  /** @throws std::runtime_error when tf does not get to know the camera. */
-  void requireOdometry(const std::string& camera_frame) const
-  {
-    constexpr double PATIENCE = 0.5;  // [s]
-    std::string error;
-    if (!params_.odom_frame.empty() && !waitForTransform(camera_frame, ros::Time(0), PATIENCE, error))
-    {
-      throw std::runtime_error("tf does not know the camera's frame '" + camera_frame + "' in ~odom_frame '" +
-                               params_.odom_frame + "': " + error);
+      begin(nullptr);
+      ROS_INFO_STREAM("wanted: view '" << message.view << "', goal '" << message.goal << "'");
     }
   }
 
-  /** Follows another view, or none. The mutex is held. */
-  void begin(std::shared_ptr<Session> session)
+  /** Another choice is made. The mutex is held. @param session when it is prepared already. */
+  void begin(std::unique_ptr<PlaneSession> session)
   {
-    session_ = std::move(session);
-    ++generation_;
+    prepared_ = std::move(session);
+    ++task_number_;
     newest_.reset();
-    question_.reset();
-    answer_.reset();
-    next_question_ = Clock::now();
-    state_ = TrackingState::SEARCHING;
-    reason_ = session_ ? "looks for the view" : "no view is followed";
-    points_ = 0;
+    status_ = Status();
+    if (!choice_.chosen().view.empty())
+    {
+      status_.reason = LOOKS_FOR_IT;
+    }
+    wake_.notify_all();
   }
 
-  // -------------------------------------------------------------------------------------------------------- images
+  // ------------------------------------------------------------------------------------------------------ following
 
-  void take(const CameraFrame& frame)
+  void onFrame(const CameraFrame& frame)
   {
     {
       const std::lock_guard<std::mutex> lock(mutex_);
@@ -380,91 +227,119 @@ private:
 
   void follow()
   {
+    Task task;
     std::unique_lock<std::mutex> lock(mutex_);
+    const auto due = [&] {
+      return stopping_ || task.number != task_number_ || (newest_ && !task.chosen.view.empty());
+    };
     while (!stopping_)
     {
-      wake_.wait(lock, [this] { return stopping_ || (newest_ && session_); });
-      if (stopping_)
+      if (task.chosen.view.empty())
       {
-        break;
+        wake_.wait(lock, due);
       }
-      const CameraFrame frame = *std::exchange(newest_, std::nullopt);
-      const std::shared_ptr<Session> session = session_;
-      const std::uint64_t generation = generation_;
-      std::optional<Answer> answer = std::exchange(answer_, std::nullopt);
-      if (answer && answer->generation != generation)
+      else
       {
-        answer.reset();
+        wake_.wait_for(lock, REPORT_PERIOD, due);
       }
+      if (task.number != task_number_)
+      {
+        task = { choice_.chosen(), task_number_ };
+        session_ = std::move(prepared_);
+        last_frame_ = Clock::now();
+        ++era_;
+      }
+      const std::optional<CameraFrame> frame = std::exchange(newest_, std::nullopt);
       lock.unlock();
-      try
+      if (!task.chosen.view.empty() && !stopping_)
       {
-        process(*session, frame, answer, generation);
-      }
-      catch (const std::exception& error)
-      {
-        ROS_ERROR_STREAM_THROTTLE(10.0, oneLine(error));
+        guarded("following", [&] { step(task, frame); });
       }
       lock.lock();
     }
   }
 
-  void process(Session& session, const CameraFrame& frame, std::optional<Answer> answer, std::uint64_t generation)
+  void step(const Task& task, const std::optional<CameraFrame>& frame)
+  {
+    if (!session_)
+    {
+      if (reported_.refused && reported_.number == task.number && Clock::now() < reported_.time + REPORT_PERIOD)
+      {
+        return;
+      }
+      SessionStarter::Preparation preparation = starter_.prepare(task.chosen.view);
+      if (!preparation.session)
+      {
+        report(task, preparation.reason, preparation.refused);
+        return;
+      }
+      session_ = std::move(preparation.session);
+      last_frame_ = Clock::now();
+    }
+    if (frame)
+    {
+      last_frame_ = Clock::now();
+      const std::string fault = guarded("an image on '" + camera_.imageTopic() + "'", [&] { process(task, *frame); });
+      if (!fault.empty())
+      {
+        publishHomography(task, PlaneTrack(), frame->image->header, fault, false);
+      }
+    }
+    else if (const std::string fault = camera_.fault(); !fault.empty())
+    {
+      report(task, fault, true);
+    }
+    else if (Clock::now() > last_frame_ + NO_IMAGE_AFTER)
+    {
+      report(task, "no image comes on '" + camera_.imageTopic() + "'", false);
+    }
+  }
+
+  void process(const Task& task, const CameraFrame& frame)
   {
     const Clock::time_point begin_time = Clock::now();
     const std_msgs::Header& header = frame.image->header;
-    if (!session.rectifier.isOf(*frame.info))
+    if (!session_->isOf(*frame.info))
     {
-      const std::string reason = "the camera's calibration has changed: call ~start again";
-      ROS_ERROR_STREAM_THROTTLE(10.0, reason);
-      tell(session, PlaneTrack(), header, generation, reason);
+      const std::string reason = "the camera's calibration has changed";
+      ROS_ERROR_STREAM_THROTTLE(10.0, reason << ": view '" << task.chosen.view << "' has to be chosen anew");
+      updateStatus(task, PlaneTrack(), reason);
+      publishHomography(task, PlaneTrack(), header, reason, true);
       return;
     }
-    const cv::Mat image = session.rectifier.image(toGrey(*frame.image, camera_.imageTopic()));
-    const ros::Duration tolerance(0.5);
-    if (header.stamp + tolerance < session.last_stamp)
+    const cv::Mat image = toGrey(*frame.image, camera_.imageTopic());
+    std::string news;
+    const std::string jump = session_->advance(header.stamp);
+    if (!jump.empty())
     {
-      ROS_WARN_STREAM("time has gone back in images: the view is looked for anew");
-      session.reset(params_.tracker);
-      answer.reset();
-      const std::lock_guard<std::mutex> lock(mutex_);
-      if (generation != generation_)
-      {
-        return;
-      }
-      generation = ++generation_;  // what is asked is of another time
-      state_ = TrackingState::SEARCHING;
-      reason_ = "looks for the view";
+      ROS_WARN_STREAM(jump << ": the view is looked for anew");
+      ++era_;
+      news = LOOKS_FOR_IT;
     }
-    session.last_stamp = header.stamp;
-    const std::optional<Eigen::Isometry3d> camera_in_odom = cameraInOdom(header);
-    if (answer)
+    const std::optional<Eigen::Isometry3d> camera_in_odom =
+        starter_.cameraInOdom(header, [this] { return stopping_.load(); });
+    const std::optional<PlaneSearcher::Search> search = searcher_.finished();
+    if (search && search->era == era_)
     {
-      heed(session, *answer);
+      session_->start(search->answer, search->camera_in_odom);
+      news = search->answer.h ? "the view cannot be tracked where it was found" : search->answer.reason;
     }
-    const PlaneTrack& track = session.tracker->add(image, camera_in_odom);
-    if (track.state == TrackingState::TRACKING)
+    const PlaneTrack& track = session_->add(image, camera_in_odom);
+    if (track.state != TrackingState::TRACKING && searcher_.ready())
     {
-      session.last_h = track.homography.h;
-      session.addToPath();
+      searcher_.begin({ era_, session_->question(image), camera_in_odom, {} });
     }
+    const std::string reason = updateStatus(task, track, news);
+    publishHomography(task, track, header, reason, false);
+    if (overlay_publisher_.getNumSubscribers() > 0)
     {
-      const std::lock_guard<std::mutex> lock(mutex_);
-      if (generation != generation_)
-      {
-        return;
-      }
-      note(track, answer);
-      if (track.state != TrackingState::TRACKING && !asking_ && Clock::now() >= next_question_)
-      {
-        asking_ = true;
-        question_ =
-            Question{ generation, session.view, session.raw_region, frame.image, camera_in_odom, session.last_h };
-        wake_.notify_all();
-      }
+      const TrackedHomography& found = track.homography;
+      const std::string points =
+          std::to_string(found.supporting) + " of " + std::to_string(found.looked_for) + " points";
+      const std::string text =
+          task.chosen.view + ": " + nameOf(track.state) + (reason.empty() ? ", " + points : ": " + reason);
+      overlay_publisher_.publish(toImage(session_->overlay(text), sensor_msgs::image_encodings::BGR8, header));
     }
-    tell(session, track, header, generation, reason());
-    draw(session, track, image, header);
     const std::lock_guard<std::mutex> lock(mutex_);
     const double ms = 1e3 * std::chrono::duration<double>(Clock::now() - begin_time).count();
     images_ += 1;
@@ -472,271 +347,130 @@ private:
     ms_max_ = std::max(ms_max_, ms);
   }
 
-  /** Starts tracking where the point matcher has found the view. */
-  static void heed(Session& session, const Answer& answer)
-  {
-    std::optional<Eigen::Matrix3d> h = answer.h;
-    if (h && session.rectifier.active())
-    {
-      Correspondences pairs;
-      for (const Correspondence& pair : answer.inliers)
-      {
-        pairs.push_back({ session.rectifier.point(pair.reference), session.rectifier.point(pair.current) });
-      }
-      h = homographyFromPoints(pairs);
-    }
-    if (h)
-    {
-      session.tracker->start(*h, answer.camera_in_odom);
-    }
-  }
+  // ----------------------------------------------------------------------------------------------------- publishing
 
-  /** For logs, diagnostics and messages. The mutex is held. */
-  void note(const PlaneTrack& track, const std::optional<Answer>& answer)
+  /**
+   * For logs, diagnostics and messages.
+   * @param news why the view is not tracked; empty: as before.
+   * @return why, now; empty when it is tracked.
+   */
+  std::string updateStatus(const Task& task, const PlaneTrack& track, const std::string& news)
   {
-    const TrackingState before = std::exchange(state_, track.state);
-    points_ = track.homography.supporting;
+    const std::lock_guard<std::mutex> lock(mutex_);
+    if (task.number != task_number_)
+    {
+      return status_.reason;
+    }
+    const TrackingState before = std::exchange(status_.state, track.state);
+    status_.points = track.homography.supporting;
     if (track.state == TrackingState::TRACKING)
     {
-      reason_.clear();
+      status_.reason.clear();
       if (before != TrackingState::TRACKING)
       {
-        ROS_INFO_STREAM("view '" << session_->view << "' is tracked by " << points_ << " points");
+        ROS_INFO_STREAM("view '" << task.chosen.view << "' is tracked by " << status_.points << " points");
       }
-      return;
+      return "";
     }
     if (before == TrackingState::TRACKING)
     {
-      ROS_WARN_STREAM("view '" << session_->view << "' is not in the image: asks " << match_service_);
-      reason_ = "the view is not in the image";
+      status_.reason = "the view is not in the image";
+      ROS_WARN_STREAM("view '" << task.chosen.view << "' is not in the image: it is looked for");
     }
-    if (answer)
+    if (!news.empty())
     {
-      reason_ = answer->h ? "the view cannot be tracked where it was found" : answer->reason;
-      ROS_INFO_STREAM_THROTTLE(5.0, "view '" << session_->view << "' is not found: " << reason_);
+      status_.reason = news;
+      ROS_INFO_STREAM_THROTTLE(5.0, "view '" << task.chosen.view << "' is not tracked: " << news);
     }
+    return status_.reason;
   }
 
-  std::string reason()
+  /** Publishes why a view is not followed: at once when it is another view or refused, else twice a second. */
+  void report(const Task& task, const std::string& reason, bool refused)
   {
-    const std::lock_guard<std::mutex> lock(mutex_);
-    return reason_;
-  }
-
-  void tell(const Session& session, const PlaneTrack& track, const std_msgs::Header& header, std::uint64_t generation,
-            const std::string& reason)
-  {
-    const std::lock_guard<std::mutex> lock(mutex_);
-    if (generation == generation_)  // else another view is followed by now
-    {
-      homography_publisher_.publish(toHomography(track, session.view, header, reason));
-    }
-  }
-
-  void draw(const Session& session, const PlaneTrack& track, const cv::Mat& image, const std_msgs::Header& header)
-  {
-    if (overlay_publisher_.getNumSubscribers() == 0)
+    const Clock::time_point now = Clock::now();
+    if (task.number == reported_.number && refused == reported_.refused && now < reported_.time + REPORT_PERIOD)
     {
       return;
     }
-    FollowedView view;
-    view.region = session.region;
-    view.h = track.homography.h;
-    view.found = track.homography.points;
-    view.path = session.path;
-    for (const Eigen::Vector2d& point : session.tracker->points())
-    {
-      if (std::find(view.found.begin(), view.found.end(), point) == view.found.end())
-      {
-        view.missing.push_back(point);
-      }
-    }
-    const std::string why = reason();
-    view.text = session.view + ": " + nameOf(track.state);
-    view.text += why.empty() ? ", " + std::to_string(track.homography.supporting) + " of " +
-                                   std::to_string(track.homography.looked_for) + " points"
-                             : ": " + why;
-    overlay_publisher_.publish(toImage(drawFollowedView(image, view), sensor_msgs::image_encodings::BGR8, header));
+    reported_ = { task.number, refused, now };
+    updateStatus(task, PlaneTrack(), reason);
+    std_msgs::Header header;
+    header.stamp = ros::Time::now();
+    publishHomography(task, PlaneTrack(), header, reason, refused);
   }
 
-  // ------------------------------------------------------------------------------------------------------ odometry
-
-  /** tf2's own timeout is on ROS time and does not end while that stands still. */
-  bool waitForTransform(const std::string& camera_frame, const ros::Time& stamp, double patience,
-                        std::string& error) const
+  void publishHomography(const Task& task, const PlaneTrack& track, const std_msgs::Header& header,
+                         const std::string& reason, bool refused)
   {
-    const ros::WallTime deadline = ros::WallTime::now() + ros::WallDuration(patience);
-    while (!tf_buffer_.canTransform(params_.odom_frame, camera_frame, stamp, &error))
+    Homography message = toHomography(track, task.chosen.view, header, reason);
+    message.goal = task.chosen.goal;
+    message.refused = refused;
+    const std::lock_guard<std::mutex> lock(mutex_);
+    if (task.number == task_number_)  // else another view is followed by now
     {
-      if (ros::WallTime::now() >= deadline)
-      {
-        return false;
-      }
-      ros::WallDuration(0.002).sleep();
-      error.clear();
+      homography_publisher_.publish(message);
     }
-    return true;
-  }
-
-  /** Where the camera was when an image was taken; empty where tf does not know. */
-  std::optional<Eigen::Isometry3d> cameraInOdom(const std_msgs::Header& header) const
-  {
-    if (params_.odom_frame.empty())
-    {
-      return std::nullopt;
-    }
-    std::string error;
-    try
-    {
-      if (waitForTransform(header.frame_id, header.stamp, params_.tf_patience, error))
-      {
-        return toIsometry(tf_buffer_.lookupTransform(params_.odom_frame, header.frame_id, header.stamp).transform);
-      }
-    }
-    catch (const tf2::TransformException& exception)
-    {
-      error = exception.what();
-    }
-    ROS_WARN_STREAM_THROTTLE(5.0, "tf does not know '"
-                                      << header.frame_id << "' in '" << params_.odom_frame
-                                      << "' at the image's time; it is followed without odometry: " << error);
-    return std::nullopt;
-  }
-
-  // ------------------------------------------------------------------------------------------------- point matching
-
-  void ask()
-  {
-    const auto period =
-        std::chrono::duration_cast<Clock::duration>(std::chrono::duration<double>(params_.match_period));
-    std::unique_lock<std::mutex> lock(mutex_);
-    while (!stopping_)
-    {
-      wake_.wait(lock, [this] { return stopping_ || question_; });
-      if (stopping_)
-      {
-        break;
-      }
-      const Question question = *std::exchange(question_, std::nullopt);
-      next_question_ = Clock::now() + period;
-      lock.unlock();
-      Answer answer = answerOf(question);
-      lock.lock();
-      asking_ = false;
-      answer_ = std::move(answer);
-    }
-    asking_ = false;
-  }
-
-  Answer answerOf(const Question& question) const
-  {
-    constexpr double RIVALRY = 0.5;  // of the inliers
-    Answer answer{ question.generation, std::nullopt, {}, "", question.camera_in_odom };
-    try
-    {
-      const MatchPoints::Response first = match(question.view, *question.image, answer.reason);
-      if (first.success == 0)
-      {
-        return answer;
-      }
-      const Eigen::Matrix3d h = homographyOf(first);
-      const bool expected = question.last_h && !isElsewhere(question.region, h, *question.last_h);
-      if (!expected)
-      {
-        const cv::Mat rest = withoutRegion(toGrey(*question.image, "image"), question.region, h);
-        std::string ignored;
-        const MatchPoints::Response second =
-            match(question.view, toImage(rest, sensor_msgs::image_encodings::MONO8, question.image->header), ignored);
-        if (second.success != 0 && second.inliers >= RIVALRY * first.inliers &&
-            isElsewhere(question.region, h, homographyOf(second)))
-        {
-          answer.reason = "the view is seen in two places";
-          return answer;
-        }
-      }
-      answer.h = h;
-      for (const PointMatch& point : first.matches)
-      {
-        if (point.inlier != 0)
-        {
-          answer.inliers.push_back({ { point.reference_x, point.reference_y }, { point.current_x, point.current_y } });
-        }
-      }
-    }
-    catch (const std::exception& error)
-    {
-      answer.reason = oneLine(error);
-    }
-    return answer;
-  }
-
-  static Eigen::Matrix3d homographyOf(const MatchPoints::Response& response)
-  {
-    return Eigen::Map<const Eigen::Matrix<double, 3, 3, Eigen::RowMajor>>(response.model_matrix.data());
-  }
-
-  MatchPoints::Response match(const std::string& view, const sensor_msgs::Image& image, std::string& reason) const
-  {
-    MatchPoints service;
-    service.request.reference.view = view;
-    service.request.query.image = image;
-    if (!ros::service::call(match_service_, service))
-    {
-      service.response.success = 0;
-      service.response.message = match_service_ + " does not answer";
-    }
-    reason = service.response.message;
-    return service.response;
   }
 
   void diagnose(diagnostic_updater::DiagnosticStatusWrapper& status)
   {
     constexpr double NOT_A_NUMBER = std::numeric_limits<double>::quiet_NaN();
     const std::lock_guard<std::mutex> lock(mutex_);
-    const bool worrying = session_ && state_ != TrackingState::TRACKING;
+    const ChosenView& chosen = choice_.chosen();
+    const bool worrying = !chosen.view.empty() && status_.state != TrackingState::TRACKING;
+    const std::string reason = status_.reason.empty() ? "" : ": " + status_.reason;
     status.summary(worrying ? diagnostic_msgs::DiagnosticStatus::WARN : diagnostic_msgs::DiagnosticStatus::OK,
-                   session_ ? nameOf(state_) + (reason_.empty() ? "" : ": " + reason_) : reason_);
-    status.add("View", session_ ? session_->view : "");
-    status.add("Points", points_);
-    status.add("Asks the point matcher", asking_);
+                   chosen.view.empty() ? status_.reason : nameOf(status_.state) + reason);
+    status.add("View", chosen.view);
+    status.add("Goal", chosen.goal);
+    status.add("Points", status_.points);
     status.add("Time an image, mean [ms]", images_ > 0 ? ms_sum_ / images_ : NOT_A_NUMBER);
     status.add("Time an image, largest [ms]", images_ > 0 ? ms_max_ : NOT_A_NUMBER);
     images_ = 0;
     ms_sum_ = ms_max_ = 0.0;
   }
 
-  const Params params_;
-  const std::string match_service_;
+  static constexpr std::chrono::milliseconds REPORT_PERIOD{ 500 };
+  static constexpr std::chrono::seconds NO_IMAGE_AFTER{ 2 };
+  static constexpr const char* LOOKS_FOR_IT = "looks for the view";
 
-  std::mutex mutex_;  // guards what follows; never held while an image is worked on or matched
+  const Params params_;
+  const PlaneFinder finder_;
+
+  std::mutex mutex_;  // guards what follows; never held while an image is worked on or a view is read
   std::condition_variable wake_;
-  std::shared_ptr<Session> session_;
-  std::uint64_t generation_ = 0;  // another one for each start, and when time goes back
+  ViewChoice choice_;
+  std::uint64_t task_number_ = 0;
+  std::unique_ptr<PlaneSession> prepared_;  // of the choice, for the follower
   std::optional<CameraFrame> newest_;
-  std::optional<Question> question_;
-  std::optional<Answer> answer_;
-  bool asking_ = false;
-  Clock::time_point next_question_;
-  TrackingState state_ = TrackingState::SEARCHING;
-  std::string reason_ = "no view is followed";
-  int points_ = 0;
+  Status status_;
   int images_ = 0;  // since the last diagnosis
   double ms_sum_ = 0.0;
   double ms_max_ = 0.0;
-  bool stopping_ = false;
+  std::atomic<bool> stopping_{ false };
 
-  const ViewStore store_;
-  tf2_ros::Buffer tf_buffer_;
-  tf2_ros::TransformListener transforms_;
+  // The follower's own.
+  PlaneSearcher searcher_;
+  std::unique_ptr<PlaneSession> session_;
+  Clock::time_point last_frame_;  // or when the session began
+  std::uint64_t era_ = 0;         // another one for each session, and when time goes back
+  struct
+  {
+    std::uint64_t number = 0;
+    bool refused = false;
+    Clock::time_point time;
+  } reported_;
+
   CameraInput camera_;
+  SessionStarter starter_;
   image_transport::ImageTransport transport_;
   ros::Publisher homography_publisher_;
   image_transport::Publisher overlay_publisher_;
+  ros::Subscriber wanted_subscriber_;
   ros::ServiceServer start_service_;
   ros::ServiceServer stop_service_;
-  ros::WallTimer view_timer_;
   std::thread follower_;
-  std::thread asker_;
 };
 
 }  // namespace view_servo

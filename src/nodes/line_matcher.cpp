@@ -86,11 +86,14 @@ public:
     copyRowMajor(result.fundamental, response.fundamental);
   }
 
-  static Message toMessage(const ViewMatch& result, const std::string& view, const std_msgs::Header& header)
+  static Message toMessage(const ViewMatch& result, const MatchLabel& label)
   {
     Message message;
-    message.header = header;
-    message.view = view;
+    message.header = label.header;
+    message.view = label.chosen.view;
+    message.goal = label.chosen.goal;
+    message.reason = result.lines.empty() ? result.message : "";
+    message.refused = label.refused;
     message.matches = toLineMatches(result.lines);
     message.points = toPointMatches(result.matches);
     return message;
@@ -112,12 +115,13 @@ private:
  *  - those of the matcher, see matcherParameters().
  *
  * Subscribes:
- *  - `image_raw` (sensor_msgs/Image), `camera_info` (sensor_msgs/CameraInfo).
+ *  - `image_raw` (sensor_msgs/Image), `camera_info` (sensor_msgs/CameraInfo);
+ *  - `wanted_view` (view_servo/WantedView): the view that a driver wants matched; an empty one ends that.
  *
  * Publishes:
- *  - `line_matches` (view_servo/LineMatches): for each image matched, with the image's header; nothing when the view
- *    cannot be read or the camera is not calibrated;
- *  - `overlay` (sensor_msgs/Image, bgr8): reference and image side by side; drawn when somebody listens;
+ *  - `~line_matches` (view_servo/LineMatches): for each image matched, with the image's header; refused, with the reason,
+ *    when the view cannot be matched; nothing while the camera is not calibrated;
+ *  - `~overlay` (sensor_msgs/Image, bgr8): reference and image side by side; drawn when somebody listens;
  *  - `/diagnostics` (diagnostic_msgs/DiagnosticArray): 1 Hz, camera and matching.
  *
  * Services:

@@ -92,13 +92,18 @@ public:
     }
   }
 
-  static Message toMessage(const ViewMatch& result, const std::string& view, const std_msgs::Header& header)
+  static Message toMessage(const ViewMatch& result, const MatchLabel& label)
   {
     Message message;
-    message.header = header;
-    message.view = view;
+    message.header = label.header;
+    message.view = label.chosen.view;
+    message.goal = label.chosen.goal;
+    message.reason = result.outcome == MatchOutcome::MATCHED ? "" : result.message;
+    message.refused = label.refused;
     message.matches = toPointMatches(result.matches);
-    message.homography = toHomography(result, view, header);
+    message.homography = toHomography(result, label.chosen.view, label.header);
+    message.homography.goal = label.chosen.goal;
+    message.homography.refused = label.refused;
     return message;
   }
 
@@ -118,12 +123,13 @@ private:
  *  - those of the matcher, see matcherParameters().
  *
  * Subscribes:
- *  - `image_raw` (sensor_msgs/Image), `camera_info` (sensor_msgs/CameraInfo).
+ *  - `image_raw` (sensor_msgs/Image), `camera_info` (sensor_msgs/CameraInfo);
+ *  - `wanted_view` (view_servo/WantedView): the view that a driver wants matched; an empty one ends that.
  *
  * Publishes:
- *  - `point_matches` (view_servo/PointMatches): for each image matched, with the image's header; nothing when the view
- *    cannot be read or the camera is not calibrated;
- *  - `overlay` (sensor_msgs/Image, bgr8): reference and image side by side; drawn when somebody listens;
+ *  - `~point_matches` (view_servo/PointMatches): for each image matched, with the image's header; refused, with the reason,
+ *    when the view cannot be matched; nothing while the camera is not calibrated;
+ *  - `~overlay` (sensor_msgs/Image, bgr8): reference and image side by side; drawn when somebody listens;
  *  - `/diagnostics` (diagnostic_msgs/DiagnosticArray): 1 Hz, camera and matching.
  *
  * Services:

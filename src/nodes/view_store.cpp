@@ -10,13 +10,13 @@
 #include "view_servo/ros/image_source.h"
 #include "view_servo/ros/node_base.h"
 #include "view_servo/ros/parameters.h"
+#include "view_servo/ros/transform_source.h"
 
 #include <sensor_msgs/image_encodings.h>
-#include <tf2_ros/buffer.h>
-#include <tf2_ros/transform_listener.h>
 
 #include <mutex>
 #include <optional>
+#include <stdexcept>
 #include <string>
 
 namespace view_servo
@@ -72,7 +72,6 @@ public:
   ViewStoreNode(const ros::NodeHandle& nh, const ros::NodeHandle& private_nh)
     : NodeBase(nh, private_nh),
       params_(ViewStoreNodeParams::read(private_nh)),
-      tf_listener_(tf_buffer_),
       camera_(nh, params_.camera),
       sources_(params_.sources, camera_),
       store_(sources_.store())
@@ -160,24 +159,20 @@ private:
     {
       return std::nullopt;
     }
-    // tf2's own timeout is on ROS time and does not end while that stands still.
-    const ros::WallTime deadline = ros::WallTime::now() + ros::WallDuration(0.25);
-    while (!tf_buffer_.canTransform(params_.fixed_frame, header.frame_id, header.stamp))
+    constexpr double PATIENCE = 0.25;  // [s]
+    try
     {
-      if (ros::WallTime::now() > deadline)
-      {
-        ROS_INFO_STREAM("tf does not know the pose of '" << header.frame_id << "' in '" << params_.fixed_frame
-                                                         << "' at " << header.stamp);
-        return std::nullopt;
-      }
-      ros::WallDuration(0.01).sleep();
+      return toViewPose(transforms_.lookUp(params_.fixed_frame, header.frame_id, header.stamp, PATIENCE));
     }
-    return toViewPose(tf_buffer_.lookupTransform(params_.fixed_frame, header.frame_id, header.stamp));
+    catch (const std::runtime_error& error)
+    {
+      ROS_INFO_STREAM("stored without a pose: " << error.what());
+      return std::nullopt;
+    }
   }
 
   const ViewStoreNodeParams params_;
-  tf2_ros::Buffer tf_buffer_;
-  tf2_ros::TransformListener tf_listener_;
+  const TransformSource transforms_;
   CameraInput camera_;
   ImageSourceReader sources_;
   const ViewStore& store_;

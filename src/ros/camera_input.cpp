@@ -11,6 +11,7 @@
 
 #include <cmath>
 #include <cstdint>
+#include <exception>
 #include <utility>
 
 namespace view_servo
@@ -58,6 +59,12 @@ CameraInput::CameraInput(const ros::NodeHandle& nh, const CameraInputParams& par
   info_subscriber_.subscribe(topics_nh, "camera_info", queue_size);
   check_timer_ =
       topics_nh.createWallTimer(ros::WallDuration(CHECK_PERIOD), [this](const ros::WallTimerEvent&) { checkInputs(); });
+}
+
+std::string CameraInput::fault() const
+{
+  const std::lock_guard<std::mutex> lock(mutex_);
+  return fault_;
 }
 
 CameraFrame CameraInput::latest() const
@@ -123,40 +130,49 @@ void CameraInput::frameCallback(const sensor_msgs::ImageConstPtr& image, const s
 
 void CameraInput::take(const sensor_msgs::ImageConstPtr& image, const sensor_msgs::CameraInfoConstPtr& info)
 {
-  std::string problem;
-  if (!isCalibrated(*info))
-  {
-    problem = "the camera is not calibrated: K is all zero in " + topics();
-  }
-  else
-  {
-    const Camera camera = toCamera(*info);
-    if (camera.width != static_cast<int>(image->width) || camera.height != static_cast<int>(image->height))
-    {
-      problem = "the calibration is for " + std::to_string(camera.width) + " x " + std::to_string(camera.height) +
-                " pixels and the image has " + std::to_string(image->width) + " x " + std::to_string(image->height) +
-                ", in " + topics();
-    }
-  }
+  const std::string fault = faultOf(*image, *info);
   {
     const std::lock_guard<std::mutex> lock(mutex_);
     ++pairs_;
-    problem_ = problem;
-    latest_ = problem.empty() ? CameraFrame{ image, info } : CameraFrame{};
-    frames_ += problem.empty() ? 1 : 0;
+    fault_ = problem_ = fault;
+    latest_ = fault.empty() ? CameraFrame{ image, info } : CameraFrame{};
+    frames_ += fault.empty() ? 1 : 0;
   }
-  if (!problem.empty())
+  if (!fault.empty())
   {
-    ROS_ERROR_STREAM_THROTTLE(ERROR_PERIOD, problem << "; its images are not used");
+    ROS_ERROR_STREAM_THROTTLE(ERROR_PERIOD, fault << "; its images are not used");
     if (on_problem_)
     {
-      on_problem_(problem);
+      on_problem_(fault);
     }
   }
   else if (on_frame_)
   {
     on_frame_({ image, info });
   }
+}
+
+std::string CameraInput::faultOf(const sensor_msgs::Image& image, const sensor_msgs::CameraInfo& info) const
+{
+  if (!isCalibrated(info))
+  {
+    return "the camera is not calibrated: K is all zero, or a number is not finite, in " + topics();
+  }
+  try
+  {
+    const Camera camera = toCamera(info);
+    if (camera.width != static_cast<int>(image.width) || camera.height != static_cast<int>(image.height))
+    {
+      return "the calibration is for " + std::to_string(camera.width) + " x " + std::to_string(camera.height) +
+             " pixels and the image has " + std::to_string(image.width) + " x " + std::to_string(image.height) +
+             ", in " + topics();
+    }
+  }
+  catch (const std::exception& error)
+  {
+    return "the calibration cannot be used: " + oneLine(error) + ", in " + topics();
+  }
+  return "";
 }
 
 void CameraInput::checkInputs()

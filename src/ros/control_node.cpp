@@ -90,13 +90,6 @@ bool isOutdated(const ServoStatus& last, const CommandGate& gate)
   return last.state == (gate.open() ? ServoStatus::DISABLED : ServoStatus::IDLE);
 }
 
-std::string timeJump(ros::Time& last, const ros::Time& stamp, const std::string& what)
-{
-  constexpr double TOLERANCE = 0.5;  // [s]
-  const double back = secondsBetween(stamp, std::exchange(last, stamp));
-  return back > TOLERANCE ? "time has gone back by " + seconds(back) + " in " + what : "";
-}
-
 void detail::deferShutdown()
 {
   g_shutdown_requested = 0;

@@ -53,7 +53,11 @@ ros::Time toStamp(double seconds)
 
 bool isCalibrated(const sensor_msgs::CameraInfo& info)
 {
-  return info.K[0] > 0.0 && info.K[4] > 0.0;
+  const auto is_finite = [](const auto& numbers) {
+    return std::all_of(numbers.begin(), numbers.end(), [](double number) { return std::isfinite(number); });
+  };
+  return info.K[0] > 0.0 && info.K[4] > 0.0 && is_finite(info.K) && is_finite(info.D) && is_finite(info.R) &&
+         is_finite(info.P);
 }
 
 bool sameCalibration(const sensor_msgs::CameraInfo& a, const sensor_msgs::CameraInfo& b)

@@ -83,6 +83,13 @@ void ExitDeadline::watch(const std::function<bool()>& asked)
   }
 }
 
+std::string timeJump(ros::Time& last, const ros::Time& stamp, const std::string& what)
+{
+  constexpr double TOLERANCE = 0.5;  // [s]
+  const double back = secondsBetween(stamp, std::exchange(last, stamp));
+  return back > TOLERANCE ? "time has gone back by " + seconds(back) + " in " + what : "";
+}
+
 void keepFreedMemory()
 {
 #ifdef __GLIBC__

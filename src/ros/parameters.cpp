@@ -6,6 +6,7 @@
 #include <ros/param.h>
 
 #include <algorithm>
+#include <cstddef>
 #include <optional>
 #include <sstream>
 #include <stdexcept>
@@ -52,11 +53,18 @@ std::string join(const std::vector<std::string>& words, const std::string& separ
   return text;
 }
 
+/** "a/b" of "a/b/c"; empty for a name without any. */
+std::string namespaceOf(const std::string& name)
+{
+  const std::size_t slash = name.rfind('/');
+  return slash == std::string::npos ? "" : name.substr(0, slash);
+}
+
 template <typename Params>
-Params readTable(ParameterReader& reader)
+Params readTable(ParameterReader& reader, const std::string& ns)
 {
   Params params;
-  reader.read(matcherParameters(params));
+  reader.read(matcherParameters(params), ns);
   reader.addFaults(params.validate());
   return params;
 }
@@ -102,19 +110,25 @@ void ParameterReader::read(const std::string& name, std::string& value)
 
 void ParameterReader::read(const std::vector<Parameter>& table)
 {
+  read(table, "");
+}
+
+void ParameterReader::read(const std::vector<Parameter>& table, const std::string& ns)
+{
   for (const Parameter& parameter : table)
   {
-    expect(parameter.name);
+    const std::string name = ns.empty() ? parameter.name : ns + "/" + parameter.name;
+    expect(name);
     XmlRpc::XmlRpcValue value;
-    if (private_nh_.getParam(parameter.name, value))
+    if (private_nh_.getParam(name, value))
     {
       const std::optional<std::string> text = toText(value, parameter.type);
       if (!text || !parameter.set(*text))
       {
-        faults_.push_back("~" + parameter.name + " must be " + parameter.type + (text ? ", not '" + *text + "'" : ""));
+        faults_.push_back("~" + name + " must be " + parameter.type + (text ? ", not '" + *text + "'" : ""));
       }
     }
-    values_.push_back(parameter.name + "=" + parameter.get());
+    values_.push_back(name + "=" + parameter.get());
   }
 }
 
@@ -160,8 +174,11 @@ void ParameterReader::warnOfUnknown() const
     const std::string name = key.substr(prefix.size());
     const bool known =
         std::any_of(known_.begin(), known_.end(), [&](const Parameter& parameter) { return parameter.name == name; });
-    // Deeper names belong to plugins, such as image transports.
-    if (!known && name.find('/') == std::string::npos)
+    // Names of other namespaces belong to plugins, such as image transports.
+    const std::string ns = namespaceOf(name);
+    const bool ours = std::any_of(known_.begin(), known_.end(),
+                                  [&](const Parameter& parameter) { return namespaceOf(parameter.name) == ns; });
+    if (!known && ours)
     {
       ROS_WARN_STREAM("~" << name << " is not a parameter of this node and is ignored (did you mean ~"
                           << nearestName(known_, name) << "?)");
@@ -169,14 +186,14 @@ void ParameterReader::warnOfUnknown() const
   }
 }
 
-ViewMatcherParams readMatcherParams(ParameterReader& reader)
+ViewMatcherParams readMatcherParams(ParameterReader& reader, const std::string& ns)
 {
-  return readTable<ViewMatcherParams>(reader);
+  return readTable<ViewMatcherParams>(reader, ns);
 }
 
 LineMatcherParams readLineMatcherParams(ParameterReader& reader)
 {
-  return readTable<LineMatcherParams>(reader);
+  return readTable<LineMatcherParams>(reader, "");
 }
 
 }  // namespace view_servo

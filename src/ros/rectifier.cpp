@@ -15,7 +15,7 @@ Rectifier::Rectifier(const sensor_msgs::CameraInfo& info) : info_(info)
 {
   if (!isCalibrated(info))
   {
-    throw std::runtime_error("the camera is not calibrated: K is all zero");
+    throw std::runtime_error("the camera is not calibrated: K is all zero, or a number is not finite");
   }
   model_.fromCameraInfo(info);
   active_ = std::any_of(info.D.begin(), info.D.end(), [](double coefficient) { return coefficient != 0.0; });
@@ -82,9 +82,16 @@ cv::Rect Rectifier::region(const cv::Rect& raw) const
       greatest = greatest.cwiseMax(at);
     }
   }
-  const cv::Point from(static_cast<int>(std::ceil(least.x())), static_cast<int>(std::ceil(least.y())));
-  const cv::Point to(static_cast<int>(std::floor(greatest.x())) + 1, static_cast<int>(std::floor(greatest.y())) + 1);
-  return cv::Rect(from, to) & cv::Rect(cv::Point(), size());
+  const auto within = [](double value, int limit) {  // a distortion without sense sends points anywhere
+    return value > 0.0 ? std::min(value, static_cast<double>(limit)) : 0.0;
+  };
+  const int width = size().width;
+  const int height = size().height;
+  const cv::Point from(static_cast<int>(std::ceil(within(least.x(), width))),
+                       static_cast<int>(std::ceil(within(least.y(), height))));
+  const cv::Point to(static_cast<int>(std::floor(within(greatest.x(), width))) + 1,
+                     static_cast<int>(std::floor(within(greatest.y(), height))) + 1);
+  return cv::Rect(from, to) & cv::Rect(0, 0, width, height);
 }
 
 }  // namespace view_servo

@@ -4,10 +4,11 @@
 
 #include "sim/renderer.h"
 #include "sim/trial.h"
+#include "view_servo/tracking/plane_finder.h"
 #include "view_servo/views/prepared_image.h"
-#include "view_servo/views/view_matcher.h"
 
 #include <deque>
+#include <memory>
 #include <optional>
 #include <stdexcept>
 
@@ -27,7 +28,7 @@ struct Pending
   PlaneTrack track;
 };
 
-/** Where the point matcher has found the view. */
+/** Where the view has been found by its points. */
 struct Found
 {
   double ready;
@@ -40,13 +41,14 @@ struct Found
 struct ArmTrials::Parts
 {
   Parts(const World& world, std::uint64_t seed)
-    : matcher(ViewMatcherParams()),
-      reference(SimulatedCamera(world, {}, seed).capture(world.goal), world.region, matcher.params().points)
+    : finder(ViewMatcherParams()),
+      view(std::make_shared<const PreparedImage>(SimulatedCamera(world, {}, seed).capture(world.goal), world.region,
+                                                 finder.features()))
   {
   }
 
-  ViewMatcher matcher;
-  PreparedImage reference;
+  PlaneFinder finder;
+  std::shared_ptr<const PreparedImage> view;
 };
 
 ArmTrials::ArmTrials(const World& world, const std::string& urdf_xml, const ArmTrialParams& params)
@@ -83,7 +85,7 @@ ArmOutcome ArmTrials::run(const Eigen::Isometry3d& start, const std::function<vo
   camera.setLight(conditions.light);
 
   const Eigen::Matrix3d k = withFocalLengthError(world_.camera, conditions.focal_length_error).k;
-  PlaneTracker tracker(parts_->reference.grey(), world_.region, k, params_.tracker);
+  PlaneTracker tracker(parts_->view->grey(), world_.region, k, params_.tracker);
   const cv::Rect& region = world_.region;
   Servo25d servo({ k,
                    { world_.camera.width, world_.camera.height },
@@ -94,6 +96,7 @@ ArmOutcome ArmTrials::run(const Eigen::Isometry3d& start, const std::function<vo
   Every image_due(1.0 / world_.camera_rate);
   std::deque<Pending> pending;
   std::optional<Found> found;
+  std::optional<Eigen::Matrix3d> last_h;  // where the plane was tracked last
   Twist sent = Twist::Zero();
   ArmOutcome outcome;
   std::optional<double> end;
@@ -118,15 +121,14 @@ ArmOutcome ArmTrials::run(const Eigen::Isometry3d& start, const std::function<vo
         found.reset();
       }
       const PlaneTrack& track = tracker.add(image, camera_in_base);
+      if (track.state == TrackingState::TRACKING)
+      {
+        last_h = track.homography.h;
+      }
       if (track.state != TrackingState::TRACKING && !found)
       {
-        const PreparedImage current(image, cv::Rect(), parts_->matcher.params().points);
-        const ViewMatch match = parts_->matcher.match(parts_->reference, current, GeometryModel::HOMOGRAPHY);
-        found = Found{ time + params_.matching_time, std::nullopt, camera_in_base };
-        if (match.outcome == MatchOutcome::MATCHED)
-        {
-          found->h = match.matrix;
-        }
+        const PlaneFinder::Answer answer = parts_->finder.find({ parts_->view, image, last_h });
+        found = Found{ time + params_.matching_time, answer.h, camera_in_base };
       }
       pending.push_back({ time + params_.image_delay, time, track });
       if (on_step)

@@ -129,11 +129,10 @@ TEST(ArmReplay, HomographiesAndTwistsAgreeWithTheTruth)
     poses[frame.stamp] = frame.pose;
   }
 
-  const Recorder<Homography> homographies("homography");
+  const Recorder<Homography> homographies("homography_tracker/homography");
   const Recorder<geometry_msgs::TwistStamped> twists("cmd_vel_dry");
   const Recorder<ServoError> errors("servo_error");
   ASSERT_TRUE(waitForService("homography_tracker/start"));
-  ASSERT_TRUE(waitForService("point_matcher/match"));
   ServoToViewGoal goal;
   goal.view = "goal";
   bool sent = false;
@@ -169,6 +168,10 @@ TEST(ArmReplay, HomographiesAndTwistsAgreeWithTheTruth)
   ros::Time first;
   for (const Homography& message : homographies.messages())
   {
+    if (message.header.frame_id.empty())
+    {
+      continue;  // said without an image
+    }
     const auto pose = poses.find(message.header.stamp);
     ASSERT_NE(pose, poses.end()) << message.header.stamp;
     if (!found && message.valid != 0)

@@ -204,8 +204,8 @@ std::map<ros::Time, Eigen::Matrix3d> BagReplayTest::truth_;
 TEST_F(BagReplayTest, AnswersAgreeWithTheTruth)
 {
   setViews();
-  const Recorder<PointMatches> points("point_matches");
-  const Recorder<LineMatches> lines("line_matches");
+  const Recorder<PointMatches> points("point_matcher/point_matches");
+  const Recorder<LineMatches> lines("line_matcher/line_matches");
   const ChildProcess bag(player({}));
   EXPECT_TRUE(waitUntil([&] { return points.messages().size() >= 5 && lines.messages().size() >= 5; }));
   EXPECT_EQ(restarts(points) + restarts(lines), 0);
@@ -216,8 +216,8 @@ TEST_F(BagReplayTest, AnswersAgreeWithTheTruth)
 TEST_F(BagReplayTest, GoesOnWhenTheBagLoops)
 {
   setViews();
-  const Recorder<PointMatches> points("point_matches");
-  const Recorder<LineMatches> lines("line_matches");
+  const Recorder<PointMatches> points("point_matcher/point_matches");
+  const Recorder<LineMatches> lines("line_matcher/line_matches");
   const ChildProcess bag(player({ "--loop" }));
   EXPECT_TRUE(waitUntil([&] { return restarts(points) >= 2 && restarts(lines) >= 2; }))
       << restarts(points) << " and " << restarts(lines) << " restarts";
@@ -228,23 +228,22 @@ TEST_F(BagReplayTest, GoesOnWhenTheBagLoops)
 TEST_F(BagReplayTest, NodesMayStartLate)
 {
   const ChildProcess bag(player({ "--loop" }));
-  const Recorder<LineMatches> early("line_matches");
+  const Recorder<LineMatches> early("line_matcher/line_matches");
   ASSERT_TRUE(waitUntil([&] { return early.last().has_value(); })) << "the bag does not play";
 
-  const auto node = [](const std::string& program, const std::string& name, const std::string& topic) {
+  const auto node = [](const std::string& program, const std::string& name) {
     return std::vector<std::string>{ program,
                                      "__name:=late_" + name,
                                      "_view:=first",
                                      "_rate:=50.0",
                                      "_views_dir:=" + viewsDir(name).string(),
                                      "image_raw:=camera/image_raw",
-                                     "camera_info:=camera/camera_info",
-                                     topic + ":=late_" + topic };
+                                     "camera_info:=camera/camera_info" };
   };
-  const ChildProcess point_matcher(node(POINT_MATCHER_PATH, "point_matcher", "point_matches"));
-  const ChildProcess line_matcher(node(LINE_MATCHER_PATH, "line_matcher", "line_matches"));
-  const Recorder<PointMatches> points("late_point_matches");
-  const Recorder<LineMatches> lines("late_line_matches");
+  const ChildProcess point_matcher(node(POINT_MATCHER_PATH, "point_matcher"));
+  const ChildProcess line_matcher(node(LINE_MATCHER_PATH, "line_matcher"));
+  const Recorder<PointMatches> points("late_point_matcher/point_matches");
+  const Recorder<LineMatches> lines("late_line_matcher/line_matches");
   EXPECT_TRUE(waitUntil([&] { return points.messages().size() >= 3 && lines.messages().size() >= 3; }));
   expectTrue(points);
   expectTrue(lines);
@@ -293,8 +292,8 @@ TEST_P(ShippedRunTest, EachImageIsAnsweredTrulyOrRefused)
     ViewStore(viewsDir(node)).save(last, true);
   }
   setViews("last");
-  const Recorder<PointMatches> points("point_matches");
-  const Recorder<LineMatches> lines("line_matches");
+  const Recorder<PointMatches> points("point_matcher/point_matches");
+  const Recorder<LineMatches> lines("line_matcher/line_matches");
   // An image a second; on a busy machine a matcher may leave one out while it searches all scales for a lost view.
   const ChildProcess play(
       player({ "--wait-for-subscribers", "--topics", "/camera/image_raw", "/camera/camera_info" }, bag));

@@ -1,9 +1,12 @@
 // Copyright (c) 2026, the view_servo authors
 // SPDX-License-Identifier: BSD-3-Clause
+#include "child_process.h"
 #include "node_test.h"
+#include "support/temporary_directory.h"
 
 #include "view_servo/Homography.h"
 #include "view_servo/SetView.h"
+#include "view_servo/WantedView.h"
 #include "view_servo/views/view_store.h"
 
 #include <gtest/gtest.h>
@@ -13,11 +16,14 @@
 
 #include <atomic>
 #include <cmath>
-#include <memory>
+#include <cstddef>
+#include <fstream>
+#include <functional>
 #include <mutex>
 #include <optional>
 #include <string>
 #include <thread>
+#include <vector>
 
 namespace view_servo
 {
@@ -49,10 +55,17 @@ public:
     return last_;
   }
 
-  void set(bool calibrated, double delay)
+  /** Shows nothing any more. */
+  void cover()
+  {
+    show(cv::Mat());
+  }
+
+  void set(bool calibrated, double delay, double focal_length = 500.0)
   {
     const std::lock_guard<std::mutex> lock(mutex_);
     camera_.calibrated = calibrated;
+    camera_.focal_length = focal_length;
     delay_ = delay;
   }
 
@@ -107,6 +120,9 @@ protected:
     view.name = "plain";
     view.image = cv::Mat(picture().size(), CV_8UC1, cv::Scalar(100));
     store.save(view, true);
+    view.name = "broken";
+    store.save(view, true);
+    std::ofstream(store.directory() / "broken.yaml") << "image: [";
   }
   static void TearDownTestSuite()
   {
@@ -115,16 +131,18 @@ protected:
 
   void SetUp() override
   {
-    for (const char* service : { "homography_tracker/start", "alone/start", "lost/start", "point_matcher/match" })
-    {
-      ASSERT_TRUE(waitForService(service));
-    }
+    ASSERT_TRUE(waitForService("homography_tracker/start"));
+    ASSERT_TRUE(waitForService("lost/start"));
+    ASSERT_TRUE(waitUntil([&] { return wanted_.getNumSubscribers() >= 2; }));
   }
   void TearDown() override
   {
-    std_srvs::Trigger service;
-    EXPECT_TRUE(ros::service::call("homography_tracker/stop", service));
-    EXPECT_TRUE(service.response.success);
+    for (const std::string node : { "homography_tracker", "lost" })
+    {
+      std_srvs::Trigger service;
+      EXPECT_TRUE(ros::service::call(node + "/stop", service));
+      EXPECT_TRUE(service.response.success);
+    }
   }
 
   static cv::Mat picture()
@@ -142,6 +160,60 @@ protected:
     service.request.view = view;
     EXPECT_TRUE(ros::service::call(node + "/start", service));
     return service.response;
+  }
+
+  /** What a driver does. */
+  void want(const std::string& view, const std::string& goal) const
+  {
+    WantedView message;
+    message.header.stamp = ros::Time::now();
+    message.view = view;
+    message.goal = goal;
+    wanted_.publish(message);
+  }
+
+  /** Waits for a message about a goal that is as it should be. */
+  static bool waitForAnswer(const Recorder<Homography>& homographies, const std::string& goal,
+                            const std::function<bool(const Homography&)>& is_right,
+                            const std::function<void()>& step = nullptr)
+  {
+    return waitUntil(
+        [&] {
+          const std::optional<Homography> last = homographies.last();
+          return last && last->goal == goal && is_right(*last);
+        },
+        step);
+  }
+
+  /** Wants a view, and waits until it is refused. */
+  void expectRefusal(const std::string& view, const std::string& goal, const std::string& words) const
+  {
+    SCOPED_TRACE(view);
+    want(view, goal);
+    expectRefusalOf(view, goal, words);
+  }
+
+  void expectRefusalOf(const std::string& view, const std::string& goal, const std::string& words) const
+  {
+    EXPECT_TRUE(waitForAnswer(homographies_, goal, [&](const Homography& message) {
+      return message.refused && message.reason.find(words) != std::string::npos;
+    })) << (homographies_.last() ? homographies_.last()->reason : "no message");
+    const Homography last = *homographies_.last();
+    EXPECT_EQ(last.view, view);
+    EXPECT_EQ(last.state, Homography::SEARCHING);
+    EXPECT_FALSE(last.valid);
+    EXPECT_TRUE(std::isnan(last.h[0]));
+    EXPECT_EQ(last.reason.find('\n'), std::string::npos) << last.reason;
+  }
+
+  /** Waits until images are not answered any more. */
+  bool waitForSilence() const
+  {
+    const Recorder<sensor_msgs::CameraInfo> images("camera/camera_info");
+    return waitUntil([&] {
+      const auto last = images.last();
+      return last && last->header.stamp > homographies_.last()->header.stamp + ros::Duration(0.7);
+    });
   }
 
   /** Starts as soon as there are images, and waits until the picture is found where it is. */
@@ -175,7 +247,8 @@ protected:
   }
 
   RunningCamera camera_;
-  Recorder<Homography> homographies_{ "homography" };
+  Recorder<Homography> homographies_{ "homography_tracker/homography" };
+  const ros::Publisher wanted_ = ros::NodeHandle().advertise<WantedView>("wanted_view", 1, true);
 };
 
 TEST_F(HomographyTrackerTest, FollowsAView)
@@ -205,7 +278,7 @@ TEST_F(HomographyTrackerTest, FollowsAView)
 
 TEST_F(HomographyTrackerTest, DrawsWhatItFollows)
 {
-  const Recorder<sensor_msgs::Image> overlay("overlay");
+  const Recorder<sensor_msgs::Image> overlay("homography_tracker/overlay");
   follow(exampleHomography());
   ASSERT_TRUE(waitUntil([&] { return overlay.last().has_value(); }));
   EXPECT_EQ(overlay.last()->encoding, sensor_msgs::image_encodings::BGR8);
@@ -235,11 +308,11 @@ TEST_F(HomographyTrackerTest, RefusesWhatItCannotFollowAndGoesOnWithWhatItFollow
   refused(start(""), "''");
   refused(start("large"), "640 x 480");
   refused(start("plain"), "corners");
-  refused(start("goal", "alone"), "/nobody/match");
-  refused(start("goal", "lost"), "'camera_optical_frame' in ~odom_frame 'nowhere'");
+  refused(start("broken"), "broken");
   const ros::Time then = homographies_.last()->header.stamp;
   EXPECT_TRUE(waitUntil([&] { return homographies_.last()->header.stamp > then; }));
   EXPECT_TRUE(homographies_.last()->valid);
+  EXPECT_EQ(homographies_.last()->view, "goal");
   camera_.set(false, 0.0);
   EXPECT_TRUE(waitUntil([&] { return start("goal").message.find("not calibrated") != std::string::npos; }));
   camera_.set(true, 0.0);
@@ -303,6 +376,202 @@ TEST_F(HomographyTrackerTest, LooksAnewWhenTimeGoesBack)
   EXPECT_TRUE(waitForReason(ros::Time(1.0), "looks for the view"));
   EXPECT_LT(homographies_.last()->header.stamp, ros::Time::now() - ros::Duration(2.0));
   expectTracking(exampleHomography());
+}
+
+TEST_F(HomographyTrackerTest, FollowsTheViewThatADriverWants)
+{
+  camera_.show(warped(picture(), exampleHomography()));
+  for (const std::string goal : { "goal 1", "goal 2" })
+  {
+    want("goal", goal);
+    ASSERT_TRUE(waitForAnswer(homographies_, goal, [](const Homography& message) { return message.valid != 0; }));
+    EXPECT_EQ(homographies_.last()->view, "goal");
+    EXPECT_EQ(homographies_.last()->reason, "");
+    EXPECT_FALSE(homographies_.last()->refused);
+    expectTracking(exampleHomography());
+  }
+  want("", "goal 2");
+  EXPECT_TRUE(waitForSilence());
+  want("goal", "goal 3");
+  EXPECT_TRUE(waitForAnswer(homographies_, "goal 3", [](const Homography& message) { return message.valid != 0; }));
+  ASSERT_TRUE(start("goal").success);
+  EXPECT_TRUE(waitForAnswer(homographies_, "", [](const Homography& message) { return message.valid != 0; }));
+}
+
+TEST_F(HomographyTrackerTest, NoneFromADriverLeavesAPersonsViewAlone)
+{
+  follow(exampleHomography());
+  want("", "an old goal");
+  const std::size_t before = homographies_.messages().size();
+  EXPECT_TRUE(waitUntil([&] { return homographies_.messages().size() > before + 30; }));
+  EXPECT_TRUE(homographies_.last()->valid);
+  EXPECT_EQ(homographies_.last()->view, "goal");
+}
+
+TEST_F(HomographyTrackerTest, RefusesWhatADriverCannotHave)
+{
+  expectRefusal("unknown", "1", "unknown");
+  expectRefusal("../goal", "2", "../goal");
+  expectRefusal("broken", "3", "broken");
+  camera_.show(picture());
+  expectRefusal("large", "4", "640 x 480");
+  expectRefusal("plain", "5", "corners");
+  camera_.set(false, 0.0);
+  expectRefusal("goal", "6", "not calibrated");
+  const std::size_t before = homographies_.messages().size();
+  EXPECT_TRUE(waitUntil([&] { return homographies_.messages().size() >= before + 3; }));  // for who listens later
+  camera_.set(true, 0.0);
+  expectTracking(Eigen::Matrix3d::Identity());
+  EXPECT_EQ(homographies_.last()->goal, "6");
+}
+
+TEST_F(HomographyTrackerTest, SaysWhatIsLackingUntilItIsThere)
+{
+  const auto waits = [](const std::string& words) {
+    return [words](const Homography& message) {
+      return message.valid == 0 && message.refused == 0 && message.reason.find(words) != std::string::npos;
+    };
+  };
+  const Recorder<Homography> lost("lost/homography");
+  // The last image of the test before has to grow old.
+  ASSERT_TRUE(waitUntil([&] { return start("goal", "lost").message.find("image") != std::string::npos; }));
+  want("goal", "early");
+  ASSERT_TRUE(waitForAnswer(homographies_, "early", waits("image"))) << homographies_.last()->reason;
+  EXPECT_EQ(homographies_.last()->view, "goal");
+  EXPECT_EQ(homographies_.last()->header.frame_id, "");
+  const std::size_t before = homographies_.messages().size();
+  const ros::WallTime start_time = ros::WallTime::now();
+  EXPECT_TRUE(waitUntil([&] { return homographies_.messages().size() >= before + 3; }));
+  EXPECT_GT((ros::WallTime::now() - start_time).toSec(), 0.8);
+  const SetView::Response response = start("goal", "lost");
+  EXPECT_TRUE(response.success);
+  EXPECT_NE(response.message.find("as soon as it can"), std::string::npos) << response.message;
+
+  camera_.show(picture());
+  expectTracking(Eigen::Matrix3d::Identity());
+  EXPECT_EQ(homographies_.last()->goal, "early");
+  EXPECT_TRUE(waitForAnswer(lost, "", waits("'camera_optical_frame' in 'nowhere'"))) << lost.last()->reason;
+  camera_.cover();
+  EXPECT_TRUE(waitForAnswer(homographies_, "early", waits("no image comes on '/camera/image_raw'")));
+}
+
+TEST_F(HomographyTrackerTest, RefusesImagesOfAnotherCalibrationUntilItIsChosenAnew)
+{
+  camera_.show(picture());
+  want("goal", "before");
+  expectTracking(Eigen::Matrix3d::Identity());
+  camera_.set(true, 0.0, 510.0);
+  expectRefusalOf("goal", "before", "calibration has changed");
+  want("goal", "after");
+  EXPECT_TRUE(waitForAnswer(homographies_, "after", [](const Homography& message) { return message.valid != 0; }));
+  camera_.set(true, 0.0, 500.0);
+  expectRefusalOf("goal", "after", "calibration has changed");
+  ASSERT_TRUE(start("goal").success);
+  EXPECT_TRUE(waitForAnswer(homographies_, "", [](const Homography& message) { return message.valid != 0; }));
+}
+
+TEST_F(HomographyTrackerTest, OutlivesWhatACameraShouldNotSend)
+{
+  const FakeCamera camera("camera");
+  ASSERT_TRUE(camera.waitForSubscribers(2));
+  const cv::Mat seen = warped(picture(), exampleHomography());
+  const auto goes_on = [&] {
+    const ros::Time since = ros::Time::now();
+    return waitForAnswer(
+        homographies_, "goal",
+        [&](const Homography& message) {
+          return message.valid != 0 && message.header.stamp >= since &&
+                 message.header.stamp < since + ros::Duration(DEADLINE);
+        },
+        [&] {
+          camera.publish(seen, ros::Time::now());
+          const std::optional<Homography> last = homographies_.last();
+          if (last && last->refused)
+          {
+            want("goal", "goal");  // it has begun with another calibration
+          }
+        });
+  };
+  want("goal", "goal");
+  ASSERT_TRUE(goes_on());
+  for (const CameraMessages& odd : oddMessages(camera, seen))
+  {
+    SCOPED_TRACE(odd.name);
+    camera.publish(odd.image, odd.info);
+    ASSERT_TRUE(goes_on()) << homographies_.last()->reason;
+  }
+}
+
+/** Nodes that the test starts itself. */
+class TrackerProcessTest : public HomographyTrackerTest
+{
+protected:
+  std::vector<std::string> command(const std::string& name, const std::vector<std::string>& more = {}) const
+  {
+    std::vector<std::string> words{ HOMOGRAPHY_TRACKER_PATH,
+                                    "__name:=" + name,
+                                    "_odom_frame:=",
+                                    "_views_dir:=" + viewsDir("homography_tracker").string(),
+                                    "image_raw:=camera/image_raw",
+                                    "camera_info:=camera/camera_info" };
+    words.insert(words.end(), more.begin(), more.end());
+    return words;
+  }
+  std::string output() const
+  {
+    return directory_.path() / "output";
+  }
+
+  TemporaryDirectory directory_;
+};
+
+TEST_F(TrackerProcessTest, FollowsWhatWasWantedBeforeItStarted)
+{
+  camera_.show(picture());
+  want("goal", "long ago");
+  const ChildProcess node(command("late"), output());
+  const Recorder<Homography> homographies("late/homography");
+  EXPECT_TRUE(waitForAnswer(homographies, "long ago", [](const Homography& message) { return message.valid != 0; }))
+      << node.output();
+}
+
+TEST_F(TrackerProcessTest, FollowsItsParameterUntilADriverWantsAnother)
+{
+  const ChildProcess node(command("told", { "_view:=unknown" }), output());
+  const Recorder<Homography> homographies("told/homography");
+  EXPECT_TRUE(waitForAnswer(homographies, "", [](const Homography& message) {
+    return message.refused && message.view == "unknown";
+  })) << node.output();
+  camera_.show(picture());
+  want("goal", "goal");
+  EXPECT_TRUE(waitForAnswer(homographies, "goal", [](const Homography& message) { return message.valid != 0; }));
+}
+
+TEST_F(TrackerProcessTest, EndsAtOnceWhileItLooksForTheView)
+{
+  camera_.show(makePicture(9));
+  ChildProcess node(command("ending", { "_match_period:=0.001", "_view:=goal" }), output());
+  const Recorder<Homography> homographies("ending/homography");
+  ASSERT_TRUE(waitForAnswer(homographies, "", [](const Homography& message) {
+    return message.reason.find("geometry") != std::string::npos;
+  })) << node.output();
+  const ros::WallTime start_time = ros::WallTime::now();
+  node.interrupt();
+  EXPECT_EQ(node.exitStatus(), 0) << node.output();
+  EXPECT_LT((ros::WallTime::now() - start_time).toSec(), 2.0);
+}
+
+TEST_F(TrackerProcessTest, ListsAllFaultsOfItsParameters)
+{
+  ChildProcess node(command("faulty", { "_match_period:=0", "_matching/coefficients:=7", "_matching/assignment:=lucky",
+                                        "_tf_patience:=-1", "_matching/max_cornes:=3" }),
+                    output());
+  EXPECT_EQ(node.exitStatus(), 1);
+  for (const char* words : { "~match_period", "coefficients", "~matching/assignment", "~tf_patience",
+                             "~matching/max_cornes", "~matching/max_corners?" })
+  {
+    EXPECT_NE(node.output().find(words), std::string::npos) << words << " is missing in\n" << node.output();
+  }
 }
 
 }  // namespace

@@ -151,7 +151,7 @@ protected:
   const cv::Mat picture_ = makePicture(1);
   const cv::Mat seen_ = warped(picture_, exampleHomography());
   FakeCamera camera_{ "camera" };
-  Recorder<LineMatches> matches_{ "line_matches" };
+  Recorder<LineMatches> matches_{ "line_matcher/line_matches" };
   std::set<ros::Time> sent_;
 };
 
@@ -333,7 +333,7 @@ TEST_F(LineMatcherTest, StreamsMatchesWithTheView)
   EXPECT_FALSE(setView("nobody").success);
   EXPECT_FALSE(setView("../wall").success);
   ASSERT_TRUE(setView("wall").success);
-  const Recorder<sensor_msgs::Image> overlays("overlay");
+  const Recorder<sensor_msgs::Image> overlays("line_matcher/overlay");
   ASSERT_TRUE(
       waitUntil([&] { return matches_.last().has_value() && overlays.last().has_value(); }, [&] { send(seen_); }));
 

@@ -22,6 +22,7 @@
 #include <deque>
 #include <filesystem>
 #include <functional>
+#include <limits>
 #include <mutex>
 #include <optional>
 #include <stdexcept>
@@ -202,16 +203,26 @@ public:
 
   void publish(const cv::Mat& image, const ros::Time& stamp) const
   {
-    std_msgs::Header header;
-    header.stamp = stamp;
-    header.frame_id = frame_id;
+    const sensor_msgs::CameraInfo info = infoOf(image, stamp);
+    publish(toImage(image, sensor_msgs::image_encodings::MONO8, info.header), info);
+  }
+
+  void publish(const sensor_msgs::Image& image, const sensor_msgs::CameraInfo& info) const
+  {
+    info_publisher_.publish(info);
+    image_publisher_.publish(image);
+  }
+
+  sensor_msgs::CameraInfo infoOf(const cv::Mat& image, const ros::Time& stamp) const
+  {
     sensor_msgs::CameraInfo info;
-    info.header = header;
+    info.header.stamp = stamp;
+    info.header.frame_id = frame_id;
     info.width = static_cast<std::uint32_t>(image.cols);
     info.height = static_cast<std::uint32_t>(image.rows);
     info.distortion_model = "plumb_bob";
     info.D.assign(5, 0.0);
-    const double f = calibrated ? 500.0 : 0.0;
+    const double f = calibrated ? focal_length : 0.0;
     info.K = { f, 0.0, 240.0, 0.0, f, 180.0, 0.0, 0.0, 1.0 };
     info.R = { 1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0 };
     info.P = { f, 0.0, 240.0, 0.0, 0.0, f, 180.0, 0.0, 0.0, 0.0, 1.0, 0.0 };
@@ -219,17 +230,82 @@ public:
     {
       info.K.fill(0.0);
     }
-    info_publisher_.publish(info);
-    image_publisher_.publish(toImage(image, sensor_msgs::image_encodings::MONO8, header));
+    return info;
   }
 
   std::string frame_id;
   bool calibrated = true;
+  double focal_length = 500.0;  // [px]
 
 private:
   ros::Publisher image_publisher_;
   ros::Publisher info_publisher_;
 };
+
+/** An image and its calibration, as a camera sends them. */
+struct CameraMessages
+{
+  std::string name;
+  sensor_msgs::Image image;
+  sensor_msgs::CameraInfo info;
+};
+
+/** What a camera should not send: stamps without sense, images and calibrations that contradict themselves. */
+inline std::vector<CameraMessages> oddMessages(const FakeCamera& camera, const cv::Mat& picture)
+{
+  std::vector<CameraMessages> odd;
+  const auto add = [&](const std::string& name, const ros::Time& stamp) -> CameraMessages& {
+    const sensor_msgs::CameraInfo info = camera.infoOf(picture, stamp);
+    odd.push_back({ name, toImage(picture, sensor_msgs::image_encodings::MONO8, info.header), info });
+    return odd.back();
+  };
+  const ros::Time now = ros::Time::now();
+  add("stamp 0", ros::Time());
+  add("last stamp", ros::Time(4294967295U, 0));
+  add("very last stamp", ros::Time(4294967295U, 999999999));
+  add("first stamp", ros::Time(0, 1));
+  for (int i = 0; i < 3; ++i)
+  {
+    add("steps of 1 ns", ros::Time(now.sec, now.nsec / 2 + static_cast<std::uint32_t>(i)));
+  }
+  const auto change = [&](const std::string& name, const std::function<void(CameraMessages&)>& spoil) {
+    spoil(add(name, ros::Time::now() + ros::Duration(1e-6 * static_cast<double>(odd.size()))));
+  };
+  change("no size", [](CameraMessages& messages) {
+    messages.image.width = messages.image.height = messages.image.step = 0;
+    messages.image.data.clear();
+    messages.info.width = messages.info.height = 0;
+  });
+  change("no rows", [](CameraMessages& messages) {
+    messages.image.height = messages.info.height = 0;
+    messages.image.data.clear();
+  });
+  change("too little data", [](CameraMessages& messages) { messages.image.data.resize(10); });
+  change("no step", [](CameraMessages& messages) { messages.image.step = 0; });
+  change("unknown encoding", [](CameraMessages& messages) { messages.image.encoding = "h264"; });
+  change("no encoding", [](CameraMessages& messages) { messages.image.encoding.clear(); });
+  change("huge", [](CameraMessages& messages) {
+    messages.image.width = messages.info.width = 4294967295U;
+    messages.image.height = messages.info.height = 4294967295U;
+  });
+  for (const double number : { std::nan(""), std::numeric_limits<double>::infinity(), -1.0, 1e308 })
+  {
+    change("K", [&](CameraMessages& messages) { messages.info.K[0] = number; });
+    change("K's middle", [&](CameraMessages& messages) { messages.info.K[2] = number; });
+    change("D", [&](CameraMessages& messages) { messages.info.D[0] = number; });
+    change("P", [&](CameraMessages& messages) { messages.info.P[0] = number; });
+  }
+  change("unknown distortion", [](CameraMessages& messages) {
+    messages.info.distortion_model = "none of them";
+    messages.info.D = { 0.1, 0.2 };
+  });
+  change("binning", [](CameraMessages& messages) { messages.info.binning_x = messages.info.binning_y = 4294967295U; });
+  change("region", [](CameraMessages& messages) {
+    messages.info.roi.x_offset = messages.info.roi.width = 4294967295U;
+    messages.info.roi.height = 1;
+  });
+  return odd;
+}
 
 /** main() of a test of nodes. */
 inline int runTests(int argc, char** argv, const std::string& name)

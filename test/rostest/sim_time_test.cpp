@@ -113,7 +113,7 @@ TEST_F(SimTimeTest, StreamsOnAfterTimeJumpsBack)
   request.view = "wall";
   SetView::Response response;
   ASSERT_TRUE(ros::service::call("point_matcher/set_view", request, response));
-  const Recorder<PointMatches> matches("point_matches");
+  const Recorder<PointMatches> matches("point_matcher/point_matches");
   double now = 2000.0;
   EXPECT_TRUE(waitUntil([&] { return matches.last() && matches.last()->header.stamp > ros::Time(2000.0); },
                         [&] { play(now += 0.1, true); }));

@@ -8,11 +8,19 @@
 #include "view_servo/PointMatches.h"
 #include "view_servo/SaveView.h"
 #include "view_servo/SetView.h"
+#include "view_servo/WantedView.h"
+#include "view_servo/views/view_store.h"
 
 #include <diagnostic_msgs/DiagnosticArray.h>
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <cmath>
+#include <cstddef>
+#include <filesystem>
+#include <fstream>
+#include <functional>
+#include <optional>
 #include <set>
 #include <string>
 #include <vector>
@@ -29,8 +37,45 @@ class StreamingTest : public ::testing::Test
 protected:
   struct Robot
   {
-    explicit Robot(const std::string& ns) : name(ns), camera(ns + "/camera"), matches(ns + "/point_matches")
+    explicit Robot(const std::string& ns)
+      : name(ns),
+        camera(ns + "/camera"),
+        matches(ns + "/point_matcher/point_matches"),
+        wanted(ros::NodeHandle().advertise<WantedView>(ns + "/wanted_view", 1, true))
     {
+    }
+
+    /** What a driver does. */
+    void want(const std::string& view, const std::string& goal) const
+    {
+      WantedView message;
+      message.header.stamp = ros::Time::now();
+      message.view = view;
+      message.goal = goal;
+      wanted.publish(message);
+    }
+
+    /** Whether the last answer is about a view and a goal. */
+    bool answersFor(const std::string& view, const std::string& goal) const
+    {
+      const std::optional<PointMatches> last = matches.last();
+      return last && last->view == view && last->goal == goal;
+    }
+
+    /** Waits until the view is refused for a goal; a message says why. */
+    void expectRefusal(const std::string& view, const std::string& goal, const std::string& words,
+                       const std::function<void()>& step = nullptr) const
+    {
+      want(view, goal);
+      ASSERT_TRUE(waitUntil([&] { return answersFor(view, goal); }, step)) << goal;
+      const PointMatches answer = *matches.last();
+      EXPECT_TRUE(answer.refused);
+      EXPECT_NE(answer.reason.find(words), std::string::npos) << answer.reason;
+      EXPECT_TRUE(answer.matches.empty());
+      EXPECT_FALSE(answer.homography.valid);
+      EXPECT_TRUE(answer.homography.refused);
+      EXPECT_EQ(answer.homography.goal, goal);
+      EXPECT_EQ(answer.homography.reason, answer.reason);
     }
 
     /** A frame of the picture now; its stamp is remembered. */
@@ -78,6 +123,7 @@ protected:
     std::string name;
     FakeCamera camera;
     Recorder<PointMatches> matches;
+    ros::Publisher wanted;
     std::set<ros::Time> sent;
   };
 
@@ -94,6 +140,7 @@ protected:
       ASSERT_TRUE(waitForService(robot->name + "/point_matcher/set_view"));
       ASSERT_TRUE(waitForService(robot->name + "/view_store/save"));
       ASSERT_TRUE(robot->camera.waitForSubscribers(2));
+      ASSERT_TRUE(waitUntil([&] { return robot->wanted.getNumSubscribers() >= 2; }));
       ASSERT_TRUE(robot->setView("").success);
     }
   }
@@ -160,7 +207,7 @@ TEST_F(StreamingTest, DrawsTheOverlayForThoseWhoListen)
 {
   left_.teach("wall", picture_);
   ASSERT_TRUE(left_.setView("wall").success);
-  const Recorder<sensor_msgs::Image> overlays("left/overlay");
+  const Recorder<sensor_msgs::Image> overlays("left/point_matcher/overlay");
   ASSERT_TRUE(waitUntil([&] { return overlays.last().has_value(); }, [&] { left_.send(seen_); }));
   EXPECT_EQ(overlays.last()->encoding, sensor_msgs::image_encodings::BGR8);
   EXPECT_EQ(overlays.last()->header.frame_id, left_.camera.frame_id);
@@ -283,6 +330,122 @@ TEST_F(StreamingTest, GoesOnWhenTheViewDisappears)
   left_.teach("wall", picture_);
   EXPECT_TRUE(waitUntil([&] { return left_.matches.last() && left_.matches.last()->header.stamp > since; },
                         [&] { left_.send(seen_); }));
+}
+
+TEST_F(StreamingTest, MatchesTheViewThatADriverWants)
+{
+  left_.teach("wall", picture_);
+  left_.teach("poster", makePicture(3));
+  left_.want("wall", "goal 1");
+  const auto send = [&] {
+    left_.send(seen_);
+  };
+  ASSERT_TRUE(
+      waitUntil([&] { return left_.answersFor("wall", "goal 1") && left_.matches.last()->homography.valid; }, send));
+  EXPECT_FALSE(left_.matches.last()->refused);
+  EXPECT_EQ(left_.matches.last()->reason, "");
+  EXPECT_EQ(left_.matches.last()->homography.goal, "goal 1");
+  left_.want("poster", "goal 2");
+  ASSERT_TRUE(waitUntil([&] { return left_.answersFor("poster", "goal 2"); }, send));
+  EXPECT_FALSE(left_.matches.last()->refused);
+  EXPECT_NE(left_.matches.last()->reason, "");
+  ASSERT_TRUE(left_.setView("wall").success);
+  ASSERT_TRUE(waitUntil([&] { return left_.answersFor("wall", ""); }, send));
+  left_.want("wall", "goal 3");
+  ASSERT_TRUE(waitUntil([&] { return left_.answersFor("wall", "goal 3"); }, send));
+
+  // None, from a driver, ends what a driver wanted.
+  left_.want("", "goal 3");
+  const Recorder<diagnostic_msgs::DiagnosticArray> diagnostics("/diagnostics");
+  const auto ended = [&] {
+    for (const diagnostic_msgs::DiagnosticArray& array : diagnostics.messages())
+    {
+      for (const diagnostic_msgs::DiagnosticStatus& status : array.status)
+      {
+        if (status.name.find("left/point_matcher") != std::string::npos && status.message == "no view is set")
+        {
+          return true;
+        }
+      }
+    }
+    return false;
+  };
+  EXPECT_TRUE(waitUntil(ended, send));
+}
+
+TEST_F(StreamingTest, NoneFromADriverLeavesAPersonsViewAlone)
+{
+  left_.teach("wall", picture_);
+  ASSERT_TRUE(left_.setView("wall").success);
+  left_.want("", "an old goal");
+  const std::size_t before = left_.matches.messages().size();
+  EXPECT_TRUE(waitUntil([&] { return left_.matches.messages().size() >= before + 20; }, [&] { left_.send(seen_); }));
+  EXPECT_TRUE(left_.answersFor("wall", ""));
+}
+
+TEST_F(StreamingTest, RefusesAViewThatCannotBeMatched)
+{
+  const std::filesystem::path views = viewsDir("left/point_matcher");
+  left_.expectRefusal("nobody", "missing", "nobody");  // without any image
+  EXPECT_EQ(left_.matches.last()->header.frame_id, "");
+  EXPECT_LT(std::abs((ros::Time::now() - left_.matches.last()->header.stamp).toSec()), 10.0);
+  left_.expectRefusal("../wall", "name", "../wall");
+  left_.teach("broken", picture_);
+  std::ofstream(views / "broken.yaml") << "image: [";
+  left_.expectRefusal("broken", "damaged", "broken");
+  StoredView large;
+  large.name = "large";
+  large.image = makePicture(1, cv::Size(640, 480));
+  ViewStore(views).save(large, true);
+  const auto send = [&] {
+    left_.send(seen_);
+  };
+  left_.expectRefusal("large", "size", "640 x 480", send);
+
+  // Who listens later learns of it, too.
+  const Recorder<PointMatches> late("left/point_matcher/point_matches");
+  EXPECT_TRUE(waitUntil([&] { return late.last() && late.last()->refused && late.last()->goal == "size"; }, send));
+  left_.teach("wall", picture_);
+  left_.want("wall", "good");
+  EXPECT_TRUE(
+      waitUntil([&] { return left_.answersFor("wall", "good") && left_.matches.last()->homography.valid; }, send));
+}
+
+TEST_F(StreamingTest, OutlivesWhatACameraShouldNotSend)
+{
+  left_.teach("wall", picture_);
+  left_.want("wall", "goal");
+  const auto goes_on = [&] {
+    const ros::Time since = ros::Time::now();
+    return waitUntil(
+        [&] {
+          const std::optional<PointMatches> last = left_.matches.last();
+          return last && last->header.stamp >= since && last->header.stamp < since + ros::Duration(DEADLINE) &&
+                 last->homography.valid;
+        },
+        [&] { left_.send(seen_); });
+  };
+  ASSERT_TRUE(goes_on());
+  for (const CameraMessages& odd : oddMessages(left_.camera, seen_))
+  {
+    SCOPED_TRACE(odd.name);
+    left_.camera.publish(odd.image, odd.info);
+    ASSERT_TRUE(goes_on());
+  }
+
+  // What is wrong with an image is said.
+  CameraMessages torn{ "", toMono8(seen_), left_.camera.infoOf(seen_, ros::Time::now()) };
+  torn.image.data.resize(10);
+  EXPECT_TRUE(waitUntil(
+      [&] {
+        const std::optional<PointMatches> last = left_.matches.last();
+        return last && !last->refused && last->goal == "goal" && last->reason.find("bytes") != std::string::npos;
+      },
+      [&] {
+        torn.image.header = torn.info.header = left_.camera.infoOf(seen_, ros::Time::now()).header;
+        left_.camera.publish(torn.image, torn.info);
+      }))
+      << left_.matches.last()->reason;
 }
 
 TEST_F(StreamingTest, NamesBothTopicsWhenTheirStampsDiffer)

@@ -65,6 +65,8 @@ public:
 
   /** What is wrong with latest(), in one line; empty: nothing, and `frame` is it. @param before frame that does not do. */
   std::string missing(CameraFrame& frame, const CameraFrame& before = CameraFrame()) const;
+  /** Why the newest image cannot be used with its calibration, whatever it shows; empty: it can, or none came. */
+  std::string fault() const;
 
   /** Where images come from, resolved. */
   std::string imageTopic() const
@@ -77,6 +79,7 @@ public:
 private:
   void frameCallback(const sensor_msgs::ImageConstPtr& image, const sensor_msgs::CameraInfoConstPtr& info);
   void take(const sensor_msgs::ImageConstPtr& image, const sensor_msgs::CameraInfoConstPtr& info);
+  std::string faultOf(const sensor_msgs::Image& image, const sensor_msgs::CameraInfo& info) const;
   void checkInputs();
   std::string topics() const;
 
@@ -85,6 +88,7 @@ private:
   std::function<void(const std::string&)> on_problem_;
   mutable std::mutex mutex_;
   CameraFrame latest_;
+  std::string fault_;    // of the last pair
   std::string problem_;  // why the last frame was not usable, or none came
   int images_ = 0;       // since the last check
   int infos_ = 0;

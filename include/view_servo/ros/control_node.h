@@ -97,12 +97,6 @@ private:
   bool ever_ = false;
 };
 
-/**
- * Says when stamps go back, as when a bag loops; empty: they do not. Messages may overtake each other a little.
- * @param last stamp so far, is set. @param what has the stamps.
- */
-std::string timeJump(ros::Time& last, const ros::Time& stamp, const std::string& what);
-
 namespace detail
 {
 /** Has SIGINT, SIGTERM and the master's order to shut down only ask for an end, so that a node can stop its robot first. */

@@ -37,7 +37,7 @@ namespace view_servo
 /** A time [s] as a stamp; what no stamp can hold becomes the nearest that one can, what is not finite 0. */
 ros::Time toStamp(double seconds);
 
-/** Whether K says anything: REP 104 has an uncalibrated camera send it all zero. */
+/** Whether K has focal lengths (REP 104 has an uncalibrated camera send it all zero) and every number of the calibration is finite. */
 bool isCalibrated(const sensor_msgs::CameraInfo& info);
 
 /** Whether two calibrations say the same, whatever their headers. */

@@ -4,7 +4,7 @@
 
 #include "view_servo/control/goal_rules.h"
 #include "view_servo/ros/driver_context.h"
-#include "view_servo/ros/mailbox.h"
+#include "view_servo/ros/inbox.h"
 
 #include <actionlib/server/action_server.h>
 #include <diagnostic_msgs/DiagnosticStatus.h>
@@ -38,7 +38,7 @@ namespace view_servo
  *
  * A goal exists from the moment it is taken. A thread of the node's own prepares it, and may wait; until it begins, and then in every
  * cycle, judge() decides whether it goes on. Whatever ends a goal, first zero is sent, then the reason is published, and zeros go on
- * for a while. One mutex guards node and driver (see DriverContext). Callbacks of actionlib only fill mailboxes.
+ * for a while. One mutex guards node and driver (see DriverContext). Callbacks of actionlib only fill inboxes.
  *
  * `Driver` has
  *  - `Action`, `Velocity`, `Limiter` (of Velocity), `Task` (a goal that is ready to begin) and `ACTION`, the action's name;
@@ -505,8 +505,8 @@ private:
   }
 
   const Params params_;
-  Mailbox<Handle> new_goals_;
-  Mailbox<Handle> cancelled_goals_;
+  Inbox<Handle> new_goals_;
+  Inbox<Handle> cancelled_goals_;
 
   // What follows is guarded by mutex_.
   std::condition_variable wake_;

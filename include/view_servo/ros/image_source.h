@@ -32,6 +32,9 @@ enum class SourceKind
  */
 SourceKind kindOf(const ImageSource& source, const std::string& name);
 
+/** @throws ImageError when the camera's images have another size than a stored view. */
+void requireSameSize(const std::string& view, const cv::Size& size, const sensor_msgs::Image& image);
+
 /** An image with what is known about it. */
 struct SourcedImage
 {

@@ -37,6 +37,12 @@ double secondsBetween(const ros::Time& from, const ros::Time& to);
 double ageOf(const ros::Time& stamp);
 
 /**
+ * Says when stamps go back, as when a bag loops; empty: they do not. Messages may overtake each other a little.
+ * @param last stamp so far, is set. @param what has the stamps.
+ */
+std::string timeJump(ros::Time& last, const ros::Time& stamp, const std::string& what);
+
+/**
  * Runs what ROS calls, so that no message, timer or thread ends the node.
  * @param what is run, for the log.
  * @return the text of what was thrown, in one line; empty when nothing was.

@@ -30,6 +30,8 @@ public:
   void read(const std::string& name, double& value);
   void read(const std::string& name, std::string& value);
   void read(const std::vector<Parameter>& table);
+  /** Those of a sub-namespace: `~ns/name`. */
+  void read(const std::vector<Parameter>& table, const std::string& ns);
 
   void require(bool condition, const std::string& fault);
   void addFaults(const std::vector<std::string>& faults);
@@ -54,8 +56,11 @@ private:
   std::vector<std::string> faults_;
 };
 
-/** Reads the options of matching by points (views/matcher_parameters.h) and validates them. */
-ViewMatcherParams readMatcherParams(ParameterReader& reader);
+/**
+ * Reads the options of matching by points (views/matcher_parameters.h) and validates them.
+ * @param ns sub-namespace of the node that they are in; empty: none.
+ */
+ViewMatcherParams readMatcherParams(ParameterReader& reader, const std::string& ns = "");
 
 /** Likewise, of matching by lines. */
 LineMatcherParams readLineMatcherParams(ParameterReader& reader);

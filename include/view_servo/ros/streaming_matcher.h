@@ -9,6 +9,7 @@
 #include "view_servo/ros/image_source.h"
 #include "view_servo/ros/node_base.h"
 #include "view_servo/ros/parameters.h"
+#include "view_servo/ros/view_choice.h"
 #include "view_servo/views/overlay.h"
 #include "view_servo/views/prepared_image.h"
 #include "view_servo/views/view_cache.h"
@@ -18,6 +19,8 @@
 #include <diagnostic_updater/DiagnosticStatusWrapper.h>
 #include <image_transport/image_transport.h>
 #include <ros/publisher.h>
+#include <ros/subscriber.h>
+#include <ros/time.h>
 #include <sensor_msgs/image_encodings.h>
 #include <std_msgs/Header.h>
 #include <opencv2/core/types.hpp>
@@ -30,6 +33,7 @@
 #include <optional>
 #include <string>
 #include <thread>
+#include <utility>
 
 namespace view_servo
 {
@@ -44,14 +48,27 @@ struct StreamingMatcherParams
   static StreamingMatcherParams read(ParameterReader& reader, double default_rate);
 };
 
+/** What a message about a view says beside what was found. */
+struct MatchLabel
+{
+  std_msgs::Header header;
+  ChosenView chosen;
+  bool refused = false;  ///< the view cannot be matched whatever the camera sees
+};
+
 /**
- * A node that matches images: two given ones on request, and, when a view is set, each camera image with that stored
+ * A node that matches images: two given ones on request, and, when a view is chosen, each camera image with that stored
  * view. Parameters, all private:
  *  - `~view` (string, default ""): stored view that camera images are matched with; "" = none;
  *  - `~rate` (double, default Matching::RATE [Hz], >= 0.001): camera images are matched at most this often;
  *  - `~views_dir`, `~allow_paths`: see ImageSourceReader;
  *  - `~image_transport`, `~queue_size`, `~max_image_age`: see CameraInput;
  *  - those of Matching.
+ *
+ * The view is chosen by `~view`, by people with `~set_view`, and by a driver with a message on `wanted_view`
+ * (view_servo/WantedView); see ViewChoice. Every message says which view and which driver's goal it is about, and why
+ * nothing was found. What cannot be matched at all, because there is no such view, it is damaged or has another size than the
+ * camera's images, is refused by a message at once, and again at `~rate` while images come.
  *
  * Camera images are matched by a thread of the node's own, which always takes the newest: matching takes longer than
  * the time between two images, and in a subscriber's callback they would queue up and grow old. For the same reason it
@@ -60,13 +77,13 @@ struct StreamingMatcherParams
  * `Matching` is the way of matching. It has
  *  - `Service`, whose request has reference, query and overlay, whose response success, message, elapsed_ms and
  *    overlay; `Options`, what else a request may ask for, which by default is what camera images get; `Message`, which
- *    is published on `TOPIC`; the default `RATE` [Hz];
+ *    is published on `~TOPIC`; the default `RATE` [Hz];
  *  - `static Params readParams(ParameterReader&)`, a constructor that takes those, and `FeatureParams features() const`;
  *  - `static void clear(Service::Response&)`, which sets what a refused request leaves unknown;
  *  - `static Options options(const Service::Request&)`, which throws when the request makes no sense;
  *  - `ViewMatch match(const PreparedImage& reference, const PreparedImage& current, const Options&) const`;
  *  - `static void fill(const ViewMatch&, Service::Response&)`, for the fields that are the service's own;
- *  - `static Message toMessage(const ViewMatch&, const std::string& view, const std_msgs::Header&)`.
+ *  - `static Message toMessage(const ViewMatch&, const MatchLabel&)`, whose reason is the match's message when nothing was found.
  */
 template <typename Matching>
 class StreamingMatcher : private NodeBase
@@ -117,14 +134,20 @@ private:
       rate_(params.node.rate),
       matching_(params.matching),
       features_(matching_.features()),
-      view_(params.node.view),
-      camera_(nh, params.node.camera, [this](const CameraFrame& frame) { take(frame); }),
+      camera_(nh, params.node.camera, [this](const CameraFrame& frame) { onFrame(frame); }),
       sources_(params.node.sources, camera_),
       views_(sources_.store(), features_),
-      transport_(nh)
+      transport_(private_nh)
   {
-    matches_publisher_ = nh_.advertise<typename Matching::Message>(Matching::TOPIC, 1);
+    matches_publisher_ = private_nh_.advertise<typename Matching::Message>(Matching::TOPIC, 1);
     overlay_publisher_ = transport_.advertise("overlay", 1);
+    if (!params.node.view.empty())
+    {
+      choice_.choose(params.node.view);
+      begin();
+    }
+    wanted_subscriber_ = subscribe<WantedView>("wanted_view", 5,
+                                               [this](const WantedView::ConstPtr& message) { onWantedView(*message); });
     match_service_ = serve("match", &StreamingMatcher::match, this);
     set_view_service_ = serve("set_view", &StreamingMatcher::setView, this);
     diagnostics_.add("camera", &camera_, &CameraInput::diagnose);
@@ -180,8 +203,8 @@ private:
     }
     {
       const std::lock_guard<std::mutex> lock(mutex_);
-      view_ = request.view;
-      last_result_ = Result();
+      choice_.choose(request.view);
+      begin();
     }
     response.success = true;
     response.message = request.view.empty() ? "camera images are not matched"
@@ -189,7 +212,25 @@ private:
     ROS_INFO_STREAM(response.message);
   }
 
-  void take(const CameraFrame& frame)
+  void onWantedView(const WantedView& message)
+  {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    if (choice_.want(message))
+    {
+      begin();
+      ROS_INFO_STREAM("wanted: view '" << message.view << "', goal '" << message.goal << "'");
+    }
+  }
+
+  /** Another choice is made. The mutex is held. */
+  void begin()
+  {
+    last_result_ = Result();
+    renewed_ = true;
+    wake_.notify_all();
+  }
+
+  void onFrame(const CameraFrame& frame)
   {
     {
       const std::lock_guard<std::mutex> lock(mutex_);
@@ -205,61 +246,97 @@ private:
     std::unique_lock<std::mutex> lock(mutex_);
     while (!stopping_)
     {
-      wake_.wait(lock, [this] { return stopping_ || (newest_.has_value() && !view_.empty()); });
+      wake_.wait(lock, [this] { return stopping_ || renewed_ || (newest_ && !choice_.chosen().view.empty()); });
       if (stopping_)
       {
         break;
       }
-      const CameraFrame frame = *newest_;
-      newest_.reset();
-      const std::string view = view_;
+      renewed_ = false;
+      const ChosenView chosen = choice_.chosen();
+      if (chosen.view.empty())
+      {
+        continue;
+      }
+      const std::optional<CameraFrame> frame = std::exchange(newest_, std::nullopt);
       const Clock::time_point next = Clock::now() + period;
       lock.unlock();
-      const Result result = matchFrame(frame, view);
+      Result result;
+      const std::string fault =
+          guarded("matching", [&] { result = frame ? matchFrame(*frame, chosen) : check(chosen); });
       lock.lock();
-      if (view == view_)
+      if (!renewed_)
       {
-        last_result_ = result;
+        last_result_ = fault.empty() ? result : Result{ true, fault };
       }
-      wake_.wait_until(lock, next, [this] { return stopping_; });
+      if (frame)
+      {
+        wake_.wait_until(lock, next, [this] { return stopping_ || renewed_; });
+      }
     }
   }
 
-  Result matchFrame(const CameraFrame& frame, const std::string& view)
+  /** Whether a view can be matched, as far as is known without an image. */
+  Result check(const ChosenView& chosen)
   {
-    const bool wants_overlay = overlay_publisher_.getNumSubscribers() > 0;
-    if (!wants_overlay && matches_publisher_.getNumSubscribers() == 0)
-    {
-      return { false, "nobody listens" };
-    }
     try
     {
-      const std_msgs::Header& header = frame.image->header;
-      const std::shared_ptr<const PreparedImage> reference = views_.get(view);
+      views_.get(chosen.view);
+      return Result();
+    }
+    catch (const std::exception& error)
+    {
+      MatchLabel label{ std_msgs::Header(), chosen, true };
+      label.header.stamp = ros::Time::now();
+      return publishFailure(label, oneLine(error));
+    }
+  }
+
+  Result matchFrame(const CameraFrame& frame, const ChosenView& chosen)
+  {
+    MatchLabel label{ frame.image->header, chosen, true };
+    try
+    {
+      const std::shared_ptr<const PreparedImage> reference = views_.get(chosen.view);
+      requireSameSize(chosen.view, reference->grey().size(), *frame.image);
+      label.refused = false;
+      const bool wants_overlay = overlay_publisher_.getNumSubscribers() > 0;
+      if (!wants_overlay && matches_publisher_.getNumSubscribers() == 0)
+      {
+        return { false, "nobody listens" };
+      }
       const PreparedImage current(toGrey(*frame.image, camera_.imageTopic()), cv::Rect(), features_);
       const ViewMatch result = matching_.match(*reference, current, typename Matching::Options());
-      matches_publisher_.publish(Matching::toMessage(result, view, header));
+      matches_publisher_.publish(Matching::toMessage(result, label));
       if (wants_overlay)
       {
-        overlay_publisher_.publish(overlay(*reference, current, result, header));
+        overlay_publisher_.publish(overlay(*reference, current, result, label.header));
       }
       return { false, result.message };
     }
     catch (const std::exception& error)
     {
-      const std::string text = oneLine(error);
-      ROS_ERROR_STREAM_THROTTLE(10.0, text);
-      return { true, text };
+      return publishFailure(label, oneLine(error));
     }
+  }
+
+  Result publishFailure(const MatchLabel& label, const std::string& reason)
+  {
+    ViewMatch nothing;
+    nothing.message = reason;
+    matches_publisher_.publish(Matching::toMessage(nothing, label));
+    ROS_ERROR_STREAM_THROTTLE(10.0, "camera images are not matched: " << reason);
+    return { true, reason };
   }
 
   void diagnose(diagnostic_updater::DiagnosticStatusWrapper& status)
   {
     const std::lock_guard<std::mutex> lock(mutex_);
+    const ChosenView& chosen = choice_.chosen();
     const unsigned char level =
         last_result_.failed ? diagnostic_msgs::DiagnosticStatus::ERROR : diagnostic_msgs::DiagnosticStatus::OK;
-    status.summary(level, view_.empty() ? "no view is set" : last_result_.text);
-    status.add("View", view_);
+    status.summary(level, chosen.view.empty() ? "no view is set" : last_result_.text);
+    status.add("View", chosen.view);
+    status.add("Goal", chosen.goal);
   }
 
   const double rate_;
@@ -268,7 +345,8 @@ private:
 
   std::mutex mutex_;  // guards what follows
   std::condition_variable wake_;
-  std::string view_;
+  ViewChoice choice_;
+  bool renewed_ = false;  // the choice, since the worker has looked
   std::optional<CameraFrame> newest_;
   Result last_result_;
   bool stopping_ = false;
@@ -279,6 +357,7 @@ private:
   image_transport::ImageTransport transport_;
   ros::Publisher matches_publisher_;
   image_transport::Publisher overlay_publisher_;
+  ros::Subscriber wanted_subscriber_;
   ros::ServiceServer match_service_;
   ros::ServiceServer set_view_service_;
   std::thread worker_;

@@ -1,0 +1,69 @@
+// Copyright (c) 2026, the view_servo authors
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include "view_servo/ros/camera_input.h"
+#include "view_servo/ros/parameters.h"
+#include "view_servo/ros/plane_session.h"
+#include "view_servo/ros/transform_source.h"
+#include "view_servo/tracking/plane_tracker.h"
+#include "view_servo/views/prepared_image.h"
+#include "view_servo/views/view_cache.h"
+
+#include <std_msgs/Header.h>
+#include <Eigen/Geometry>
+
+#include <filesystem>
+#include <functional>
+#include <memory>
+#include <optional>
+#include <string>
+
+namespace view_servo
+{
+struct SessionStarterParams
+{
+  std::filesystem::path views_dir;
+  std::string odom_frame = "base_link";
+  double tf_patience = 0.05;
+  PlaneTrackerParams tracker;
+
+  static SessionStarterParams read(ParameterReader& reader);
+};
+
+/**
+ * Begins to follow views as soon as all is there that it takes: the stored view, images with a calibration, and tf.
+ * Safe to use from several threads. Parameters:
+ *  - `~views_dir` (string, default "" = $ROS_HOME/view_servo/views): where stored views are;
+ *  - `~odom_frame` (string, default "base_link"): frame that does not jump, which tf knows the camera's frame in; "": none;
+ *  - `~tf_patience` (double, default 0.05 [s], >= 0): time that an image waits for tf;
+ *  - those of tracking, see homographyTrackerParameters().
+ */
+class SessionStarter
+{
+public:
+  struct Preparation
+  {
+    std::unique_ptr<PlaneSession> session;  ///< empty: not now
+    bool refused = false;                   ///< nor later, unless somebody changes something
+    std::string reason;                     ///< why not
+  };
+
+  /** @param features that views are prepared with. @param camera must outlive this. */
+  SessionStarter(const SessionStarterParams& params, const FeatureParams& features, const CameraInput& camera);
+
+  /** Does not wait for what is lacking. */
+  Preparation prepare(const std::string& view);
+
+  /** Where the camera was when an image was taken; empty where tf does not know. @param given_up as in waitUntilReady(). */
+  std::optional<Eigen::Isometry3d> cameraInOdom(const std_msgs::Header& image,
+                                                const std::function<bool()>& given_up) const;
+
+private:
+  SessionStarterParams params_;
+  const CameraInput& camera_;
+  ViewCache views_;
+  TransformSource transforms_;
+};
+
+}  // namespace view_servo
