@@ -4,6 +4,7 @@
 
 #include "view_servo/ros/conversions.h"
 #include "view_servo/ros/node_base.h"
+#include "view_servo/ros/readiness.h"
 #include "view_servo/views/image_io.h"
 
 #include <ros/console.h>
@@ -73,6 +74,32 @@ CameraFrame CameraInput::latest() const
                      ", ~max_image_age is " + seconds(params_.max_image_age));
   }
   return latest_;
+}
+
+CameraFrame CameraInput::latest(double patience) const
+{
+  const std::unique_lock<std::mutex> alone(waiting_mutex_, std::try_to_lock);
+  if (!alone)
+  {
+    return latest();
+  }
+  CameraFrame frame;
+  const std::string missing = waitUntilReady(patience, [&]() -> std::string {
+    try
+    {
+      frame = latest();
+      return "";
+    }
+    catch (const ImageError& error)
+    {
+      return error.what();
+    }
+  });
+  if (!missing.empty())
+  {
+    throw ImageError(missing);
+  }
+  return frame;
 }
 
 void CameraInput::diagnose(diagnostic_updater::DiagnosticStatusWrapper& status)
