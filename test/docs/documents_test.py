@@ -55,7 +55,13 @@ KNOWN_NAMES = {
     "$ROS_HOME/view_servo/views": "a directory of the user's",
     "NAME.yaml": "a file of the user's",
     "<depend>view_servo</depend>": "a line of the user's package.xml",
-    "/diagnostics": "no node need be asked: test/rostest/lifecycle_test.cpp does",
+    "camera_calibration": "a package of ROS that need not be installed",
+    "clang-format": "a tool",
+    "clang-tidy": "a tool",
+    "CamelCase": "a style",
+    "camelCase": "a style",
+    "under_scored": "a style",
+    "UPPER_CASE": "a style",
 }
 
 
@@ -319,6 +325,7 @@ class Documented(unittest.TestCase):
     COMMAND_STARTS = ("roslaunch ", "rosrun ", "rosservice ", "rostopic ", "scripts/", "source ", "catkin_make", "catkin ")
 
     def is_command(self, text):
+        text = re.sub(r"^[A-Z_]+=\S+ ", "", text)
         first = text.split(" ")[0]
         return text.startswith(self.COMMAND_STARTS) or " " in text and (
             first in self.programs() | {"plot_run", "plot_experiment"} or first.startswith("bench_") or
@@ -403,6 +410,9 @@ class Documented(unittest.TestCase):
             match = re.match(r"(\w+):( |$)", text)
             if match:
                 return match.group(1) in parameters | fields
+            match = re.fullmatch(r"#include <view_servo/(\w+)\.h>", text)
+            if match:
+                return self.type_exists(match.group(1))
             if os.path.exists(os.path.join(ROOT, text)) or glob.glob(os.path.join(ROOT, "*", text)) or \
                     glob.glob(os.path.join(ROOT, "*", "*", text + ".*")):
                 return True
@@ -411,7 +421,7 @@ class Documented(unittest.TestCase):
             if re.fullmatch(r"-?-[\w-]+( [\w=]+)?", text):
                 return text.split(" ")[0].lstrip("-") in sources
             parts = text.split(".")
-            return text in programs | parameters or all(part in fields for part in parts) or text in words
+            return text in programs | parameters or all(part in fields for part in parts) or text.replace("()", "") in words
 
         for document in self.documents:
             for name in document.names:

@@ -1,14 +1,19 @@
 # Copyright (c) 2026, the view_servo authors
 # SPDX-License-Identifier: BSD-3-Clause
 """Running nodes that documents are compared with, each set of them under a master of its own."""
+import atexit
 import os
 import signal
 import socket
 import subprocess
+import sys
 import time
 import xmlrpc.client
 
 CALLER = "/documents"
+
+# A test that is ended from outside must not leave nodes behind.
+signal.signal(signal.SIGTERM, lambda *_: sys.exit(1))
 
 
 def free_port():
@@ -44,13 +49,15 @@ class Graph:
                                 PWD=directory, PYTHONUNBUFFERED="1")
         self.environment.pop("ROS_NAMESPACE", None)
         self.processes = []
+        atexit.register(self.stop)
         self.start("roscore", "-p", str(port))
         wait_until("a master", lambda: self.master.getPid(CALLER))
 
     def start(self, *command):
-        log = open(os.path.join(self.directory, "%s-%d.log" % (command[0], len(self.processes))), "wb")
-        self.processes.append(subprocess.Popen(command, env=self.environment, cwd=self.directory, stdout=log,
-                                               stderr=subprocess.STDOUT, start_new_session=True))
+        name = "%s-%d.log" % (os.path.basename(command[0]), len(self.processes))
+        with open(os.path.join(self.directory, name), "wb") as log:
+            self.processes.append(subprocess.Popen(command, env=self.environment, cwd=self.directory, stdout=log,
+                                                   stderr=subprocess.STDOUT, start_new_session=True))
         return self.processes[-1]
 
     def run(self, command, timeout=60.0, **options):
@@ -69,6 +76,7 @@ class Graph:
             except subprocess.TimeoutExpired:
                 process.kill()
                 process.wait()
+        self.processes = []
 
     # ----------------------------------------------------------------------------------------- what the master knows
 
