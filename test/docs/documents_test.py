@@ -517,4 +517,4 @@ class Documented(unittest.TestCase):
 
 
 if __name__ == "__main__":
-    unittest.main()
+    unittest.main(warnings="ignore")  # ROS leaves sockets to the end

@@ -8,6 +8,7 @@ wait for it.
 """
 import os
 import shutil
+import signal
 import subprocess
 import sys
 import tempfile
@@ -91,7 +92,7 @@ class AwkwardOrder(unittest.TestCase):
             self.camera.stop()
         for process in self.nodes.values():
             if process.poll() is None:
-                process.terminate()
+                process.send_signal(signal.SIGINT)  # roscpp takes leave of the master then, and only then
         for process in self.nodes.values():
             try:
                 process.wait(15.0)
@@ -117,7 +118,7 @@ class AwkwardOrder(unittest.TestCase):
         found = roslib.packages.find_node(node.package, node.type)
         self.assertTrue(found, "%s/%s is not built" % (node.package, node.type))
         name = node.namespace + node.name
-        remaps = ["%s:=%s" % remap for remap in node.remap_args]
+        remaps = ["%s:=%s" % tuple(remap) for remap in node.remap_args]
         self.nodes[name] = self.graph.start(found[0], *node.args.split(), *remaps, "__name:=" + node.name,
                                             "__ns:=" + node.namespace.rstrip("/"))
         return name
@@ -197,4 +198,4 @@ class AwkwardOrder(unittest.TestCase):
 
 
 if __name__ == "__main__":
-    unittest.main()
+    unittest.main(warnings="ignore")  # ROS leaves sockets to the end
