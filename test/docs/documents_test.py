@@ -7,6 +7,7 @@ every name in backticks has to be known to running nodes, or to the sources; C++
 A command of a form that is not known here, or a name that nothing explains, is a failure: teach this test what to do.
 """
 import collections
+import functools
 import glob
 import os
 import re
@@ -130,10 +131,13 @@ class Documented(unittest.TestCase):
     # ------------------------------------------------------------------------------------------------ of the package
 
     @staticmethod
+    @functools.lru_cache(maxsize=None)
     def launch_arguments(file):
         return roslaunch.arg_dump.get_args([os.path.join(ROOT, "launch", file)])
 
-    def programs(self):
+    @staticmethod
+    @functools.lru_cache(maxsize=None)
+    def programs():
         """Files that rosrun finds."""
         found = subprocess.run(["catkin_find", "--without-underlays", "--libexec", PACKAGE], stdout=subprocess.PIPE,
                                check=True).stdout.decode().split("\n")
@@ -339,7 +343,11 @@ class Documented(unittest.TestCase):
             for command in commands:
                 with self.subTest(where=command.place, command=command.text):
                     count += 1
-                    self.try_command(command.text)
+                    begin = time.monotonic()
+                    try:
+                        self.try_command(command.text)
+                    finally:
+                        print("%5.1f s  %s  %s" % (time.monotonic() - begin, command.place, command.text), flush=True)
         self.assertGreater(count, 30)
 
     # ----------------------------------------------------------------------------------------------------------- names

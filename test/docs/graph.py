@@ -2,18 +2,24 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Running nodes that documents are compared with, each set of them under a master of its own."""
 import atexit
+import ctypes
 import os
 import signal
 import socket
 import subprocess
-import sys
 import time
 import xmlrpc.client
 
 CALLER = "/documents"
 
-# A test that is ended from outside must not leave nodes behind.
-signal.signal(signal.SIGTERM, lambda *_: sys.exit(1))
+# A test that is ended from outside must not leave nodes behind. unittest goes on after SystemExit, not after this.
+signal.signal(signal.SIGTERM, signal.default_int_handler)
+
+
+def end_with_parent():
+    """Asks the kernel for a SIGINT when the parent ends, however that happens: a test that takes too long is killed."""
+    PR_SET_PDEATHSIG = 1
+    ctypes.CDLL(None).prctl(PR_SET_PDEATHSIG, signal.SIGINT)
 
 
 def free_port():
@@ -57,7 +63,8 @@ class Graph:
         name = "%s-%d.log" % (os.path.basename(command[0]), len(self.processes))
         with open(os.path.join(self.directory, name), "wb") as log:
             self.processes.append(subprocess.Popen(command, env=self.environment, cwd=self.directory, stdout=log,
-                                                   stderr=subprocess.STDOUT, start_new_session=True))
+                                                   stderr=subprocess.STDOUT, start_new_session=True,
+                                                   preexec_fn=end_with_parent))
         return self.processes[-1]
 
     def run(self, command, timeout=60.0, **options):
