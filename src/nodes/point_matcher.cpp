@@ -118,7 +118,7 @@ private:
  * each camera image with that stored view.
  *
  * Parameters, all private; config/point_matcher.yaml has them with their ranges:
- *  - `~view`, `~rate` (default 5.0 [Hz]), `~views_dir`, `~allow_paths`, `~image_transport`, `~queue_size`,
+ *  - `~view`, `~rate` (default 5.0 [Hz]), `~views_dir`, `~allow_paths`, `~image_patience`, `~image_transport`, `~queue_size`,
  *    `~max_image_age`: see StreamingMatcher;
  *  - those of the matcher, see matcherParameters().
  *

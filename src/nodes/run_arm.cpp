@@ -13,8 +13,8 @@ namespace
 {
 RunOutcome run(ros::NodeHandle& nh, const sim::World& world, const RunParams& params)
 {
-  SimulatedRun<ServoToViewAction> simulation(nh, "puma_sim", "servo_25d", "servo");
-  simulation.waitForServices({ "homography_tracker/start", "point_matcher/match" });
+  SimulatedRun<ServoToViewAction> simulation(nh, params, "puma_sim", "servo_25d", "servo");
+  simulation.waitForOthers({ "homography_tracker/start" });
   const Eigen::Isometry3d start = world.start(params.start);
   const Eigen::Isometry3d goal = simulation.moveTo(world.goal, world.goal);
   simulation.save(params.view, world.region);
@@ -41,5 +41,6 @@ RunOutcome run(ros::NodeHandle& nh, const sim::World& world, const RunParams& pa
  */
 int main(int argc, char** argv)
 {
-  return view_servo::runSimulation(argc, argv, "run_arm", "servo", { "rice", "near", "demo", 60.0 }, view_servo::run);
+  return view_servo::runSimulation(argc, argv, "run_arm", "servo",
+                                   { "rice", "near", "demo", 60.0, view_servo::START_PATIENCE, {} }, view_servo::run);
 }

@@ -41,8 +41,8 @@ PlanarPose onFloor(const Eigen::Isometry3d& camera)
 
 RunOutcome run(ros::NodeHandle& nh, const sim::World& world, const RunParams& params)
 {
-  SimulatedRun<HomeToViewAction> simulation(nh, "nomad_sim", "homing", "home");
-  simulation.waitForServices({});
+  SimulatedRun<HomeToViewAction> simulation(nh, params, "nomad_sim", "homing", "home");
+  simulation.waitForOthers({});
   const Eigen::Isometry3d start = parseStart(world, params.start);
   const Eigen::Isometry3d goal = simulation.moveTo(world.goal, world.goal * world.camera_on_base);
   simulation.save(params.view, cv::Rect());
@@ -71,6 +71,7 @@ RunOutcome run(ros::NodeHandle& nh, const sim::World& world, const RunParams& pa
  */
 int main(int argc, char** argv)
 {
-  return view_servo::runSimulation(argc, argv, "run_homing", "homing", { "desk", "thesis", "demo", 120.0 },
+  return view_servo::runSimulation(argc, argv, "run_homing", "homing",
+                                   { "desk", "thesis", "demo", 120.0, view_servo::START_PATIENCE, {} },
                                    view_servo::run);
 }

@@ -5,10 +5,12 @@
 #include "nodes/robot_messages.h"
 #include "sim/world.h"
 #include "view_servo/SaveView.h"
+#include "view_servo/ServoStatus.h"
 #include "view_servo/SetPose.h"
 #include "view_servo/ros/conversions.h"
 #include "view_servo/ros/node_base.h"
 #include "view_servo/ros/parameters.h"
+#include "view_servo/ros/readiness.h"
 
 #include <actionlib/client/simple_action_client.h>
 #include <geometry_msgs/PoseStamped.h>
@@ -16,48 +18,96 @@
 #include <ros/service.h>
 #include <ros/spinner.h>
 #include <ros/subscriber.h>
+#include <sensor_msgs/Image.h>
 #include <std_srvs/SetBool.h>
 #include <Eigen/Geometry>
 
+#include <unistd.h>
+#include <csignal>
+
+#include <atomic>
 #include <chrono>
-#include <condition_variable>
+#include <cstdlib>
 #include <fstream>
 #include <functional>
 #include <iostream>
+#include <memory>
 #include <mutex>
 #include <stdexcept>
 #include <string>
+#include <thread>
 #include <vector>
 
 namespace view_servo
 {
+/** What a run can be told. */
+struct RunParams
+{
+  std::string world;
+  std::string start;
+  std::string view = "demo";
+  double timeout;                                   ///< of the goal [s]
+  double patience = START_PATIENCE;                 ///< longest wait for another node [s]
+  std::function<void(const std::string&)> give_up;  ///< ends the process as a failed run, and says why
+};
+
 /**
  * What runs of simulated robots share: the view is stored at the world's goal, the robot goes to a start, and the action that
- * brings it back is called; how far off it ends is measured by the ground truth.
+ * brings it back is called; how far off it ends is measured by the ground truth. All waits are by a steady clock, end after
+ * `RunParams::patience`, and say what they wait for.
  */
 template <typename Action>
 class SimulatedRun
 {
 public:
   /** @param robot simulation, and @param controller its servo, by node names; @param action the controller's. */
-  SimulatedRun(ros::NodeHandle& nh, const std::string& robot, const std::string& controller, const std::string& action)
-    : nh_(nh), robot_(robot), controller_(controller), action_name_(action), client_(nh, action, true)
+  SimulatedRun(ros::NodeHandle& nh, const RunParams& params, const std::string& robot, const std::string& controller,
+               const std::string& action)
+    : nh_(nh), params_(params), robot_(robot), controller_(controller), action_name_(action), client_(nh, action, true)
   {
     truth_subscriber_ = nh.subscribe("ground_truth", 5, &SimulatedRun::takeTruth, this);
+    status_subscriber_ = nh.subscribe("status", 5, &SimulatedRun::takeStatus, this);
   }
 
-  /** Waits for what a run calls. @throws std::runtime_error naming what does not come. */
-  void waitForServices(const std::vector<std::string>& others)
+  /**
+   * Waits for everything that a run needs: the simulation tells where the camera is, images arrive, the services and the
+   * action are offered.
+   * @param others services besides those that every run calls.
+   * @throws std::runtime_error naming what does not come.
+   */
+  void waitForOthers(const std::vector<std::string>& others)
   {
+    std::atomic<bool> image_came(false);
+    const boost::function<void(const sensor_msgs::Image::ConstPtr&)> take_image =
+        [&image_came](const sensor_msgs::Image::ConstPtr&) {
+          image_came = true;
+        };
+    ros::Subscriber images = nh_.subscribe<sensor_msgs::Image>("camera/image_raw", 1, take_image);
     std::vector<std::string> services = { robot_ + "/set_pose", "view_store/save", controller_ + "/enable" };
     services.insert(services.end(), others.begin(), others.end());
-    for (const std::string& service : services)
-    {
-      if (!ros::service::waitForService(nh_.resolveName(service), ros::Duration(PATIENCE)))
+    const auto missing = [&]() -> std::string {
+      if (truths() == 0)
       {
-        throw std::runtime_error("there is no service " + nh_.resolveName(service));
+        return nothingCameOn(truth_subscriber_);
       }
-    }
+      if (!image_came)
+      {
+        return nothingCameOn(images);
+      }
+      while (!services.empty())  // what was there once needs no second look
+      {
+        const std::string service = nh_.resolveName(services.back());
+        if (!ros::service::exists(service, false))
+        {
+          return "there is no service " + service;
+        }
+        services.pop_back();
+      }
+      return client_.isServerConnected() ? "" : "there is no action server " + nh_.resolveName(action_name_);
+    };
+    const std::string why = waitUntilReady(params_.patience, missing);
+    images.shutdown();
+    require(why);
   }
 
   /**
@@ -70,7 +120,7 @@ public:
     SetPose move;
     move.request.pose = sim::toPose(pose);
     call(robot_ + "/set_pose", move);
-    return waitFor("an image from where the robot was put",
+    return waitFor("no image has come from where the robot was put",
                    [&camera](const Eigen::Isometry3d& before, const Eigen::Isometry3d& now) {
                      return isNear(camera, before, NEAR) && isNear(camera, now, NEAR);
                    });
@@ -80,7 +130,7 @@ public:
   Eigen::Isometry3d rest()
   {
     constexpr double STILL = 1e-6;  // [m], [rad]
-    return waitFor("the robot to stand", [](const Eigen::Isometry3d& before, const Eigen::Isometry3d& now) {
+    return waitFor("the robot does not stand still", [](const Eigen::Isometry3d& before, const Eigen::Isometry3d& now) {
       return isNear(before, now, STILL);
     });
   }
@@ -95,79 +145,177 @@ public:
     call("view_store/save", service);
   }
 
-  /** Enables the controller, sends it the goal and waits for the end. */
+  /**
+   * Enables the controller, sends it the goal and waits for the end.
+   * @throws std::runtime_error when it does not end in time, or its server vanishes; the goal is cancelled then.
+   */
   typename Action::_action_result_type::_result_type drive(const typename Action::_action_goal_type::_goal_type& goal)
   {
     std_srvs::SetBool enable;
     enable.request.data = 1;
     call(controller_ + "/enable", enable);
-    if (!client_.waitForServer(ros::Duration(PATIENCE)))
-    {
-      throw std::runtime_error("there is no action server " + nh_.resolveName(action_name_));
-    }
     client_.sendGoal(goal);
-    client_.waitForResult();
+    const std::string missing = waitForEnd();
+    if (!missing.empty())
+    {
+      client_.cancelGoal();
+      throw std::runtime_error(missing + "; its status said last: " + lastStatus());
+    }
     const auto result = client_.getResult();
     if (!result)
     {
-      throw std::runtime_error(nh_.resolveName(action_name_) + " ended without a result");
+      throw std::runtime_error(nh_.resolveName(action_name_) + " ended without a result, as " +
+                               client_.getState().toString());
     }
     return *result;
   }
 
 private:
-  static constexpr double PATIENCE = 60.0;  // for other nodes [s]
+  using Clock = std::chrono::steady_clock;
 
   static bool isNear(const Eigen::Isometry3d& a, const Eigen::Isometry3d& b, double tolerance)
   {
     return (a.translation() - b.translation()).norm() < tolerance && (a.linear() - b.linear()).norm() < 2.0 * tolerance;
   }
 
-  void takeTruth(const geometry_msgs::PoseStamped::ConstPtr& message)
+  static std::string nothingCameOn(const ros::Subscriber& subscriber)
   {
-    {
-      const std::lock_guard<std::mutex> lock(mutex_);
-      previous_ = truth_;
-      truth_ = sim::toIsometry(message->pose);
-      ++truths_;
-    }
-    arrived_.notify_all();
+    return (subscriber.getNumPublishers() == 0 ? "nobody publishes on " : "nothing has come on ") +
+           subscriber.getTopic();
   }
 
+  /** @throws std::runtime_error with what is missing, unless that is nothing. */
+  static void require(const std::string& missing)
+  {
+    if (!ros::ok())
+    {
+      throw std::runtime_error("interrupted");
+    }
+    if (!missing.empty())
+    {
+      throw std::runtime_error("waited in vain: " + missing);
+    }
+  }
+
+  void takeTruth(const geometry_msgs::PoseStamped::ConstPtr& message)
+  {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    previous_ = truth_;
+    truth_ = sim::toIsometry(message->pose);
+    ++truths_;
+  }
+
+  void takeStatus(const ServoStatus::ConstPtr& message)
+  {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    status_ = message->reason;
+  }
+
+  int truths() const
+  {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    return truths_;
+  }
+
+  std::string lastStatus() const
+  {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    return status_.empty() ? "nothing" : "'" + status_ + "'";
+  }
+
+  /**
+   * Calls a service. roscpp gives its calls no deadline, and one whose other side hangs or resets the connection may never
+   * return. So the call is made by a thread of its own that shares nothing with this object; when it takes too long the
+   * whole process ends, without destroying anything that the thread may still use.
+   * @throws std::runtime_error when the answer is no.
+   */
   template <typename Service>
   void call(const std::string& name, Service& service)
   {
-    if (!ros::service::call(nh_.resolveName(name), service) || service.response.success == 0)
+    struct Call
     {
-      throw std::runtime_error(nh_.resolveName(name) + ": " + service.response.message);
+      Service service;
+      std::atomic<bool> has_ended = { false };
+      bool was_answered = false;  // valid once it has ended
+    };
+    const std::string resolved = nh_.resolveName(name);
+    const std::shared_ptr<Call> shared = std::make_shared<Call>();
+    shared->service = service;
+    std::thread([shared, resolved] {
+      guarded("calling " + resolved, [&] { shared->was_answered = ros::service::call(resolved, shared->service); });
+      shared->has_ended = true;
+    }).detach();
+    const std::string missing = waitUntilReady(params_.patience, [&]() -> std::string {
+      return shared->has_ended ? "" : "there is no answer of the service " + resolved;
+    });
+    if (!missing.empty())
+    {
+      params_.give_up(ros::ok() ? "waited in vain: " + missing : "interrupted");
     }
+    service = shared->service;
+    if (!shared->was_answered || service.response.success == 0)
+    {
+      throw std::runtime_error(resolved + ": " + (shared->was_answered ? service.response.message : "the call failed"));
+    }
+  }
+
+  /** Waits until the goal has ended. @return why it has not; empty when it has. */
+  std::string waitForEnd()
+  {
+    constexpr std::chrono::milliseconds POLL(10);
+    constexpr std::chrono::seconds ABSENCE(5);  // of the server; a connection may come back
+    const double longest = params_.timeout + params_.patience;
+    const auto deadline =
+        Clock::now() + std::chrono::duration_cast<Clock::duration>(std::chrono::duration<double>(longest));
+    const std::string action = nh_.resolveName(action_name_);
+    Clock::time_point last_seen = Clock::now();
+    while (!client_.getState().isDone())
+    {
+      const Clock::time_point now = Clock::now();
+      last_seen = client_.isServerConnected() ? now : last_seen;
+      if (!ros::ok())
+      {
+        return "interrupted while driving";
+      }
+      if (now - last_seen > ABSENCE)
+      {
+        return "the action server " + action + " has vanished";
+      }
+      if (now > deadline)
+      {
+        return "the goal of " + action + " did not end within " + seconds(longest);
+      }
+      std::this_thread::sleep_for(POLL);
+    }
+    return "";
   }
 
   Eigen::Isometry3d waitFor(const std::string& what,
                             const std::function<bool(const Eigen::Isometry3d&, const Eigen::Isometry3d&)>& holds)
   {
-    std::unique_lock<std::mutex> lock(mutex_);
-    const int first = truths_;
-    const bool reached = arrived_.wait_for(lock, std::chrono::duration<double>(PATIENCE),
-                                           [&] { return truths_ >= first + 2 && holds(previous_, truth_); });
-    if (!reached)
-    {
-      throw std::runtime_error("waited in vain for " + what);
-    }
-    return truth_;
+    const int first = truths();
+    Eigen::Isometry3d reached = Eigen::Isometry3d::Identity();
+    require(waitUntilReady(params_.patience, [&]() -> std::string {
+      const std::lock_guard<std::mutex> lock(mutex_);
+      reached = truth_;
+      return truths_ >= first + 2 && holds(previous_, truth_) ? "" : what;
+    }));
+    return reached;
   }
 
   ros::NodeHandle& nh_;
+  const RunParams& params_;
   const std::string robot_;
   const std::string controller_;
   const std::string action_name_;
-  actionlib::SimpleActionClient<Action> client_;
-  ros::Subscriber truth_subscriber_;
-  std::mutex mutex_;  // guards what follows
-  std::condition_variable arrived_;
+  mutable std::mutex mutex_;  // guards what follows, up to the client
   Eigen::Isometry3d previous_ = Eigen::Isometry3d::Identity();
   Eigen::Isometry3d truth_ = Eigen::Isometry3d::Identity();
   int truths_ = 0;
+  std::string status_;
+  actionlib::SimpleActionClient<Action> client_;
+  ros::Subscriber truth_subscriber_;
+  ros::Subscriber status_subscriber_;
 };
 
 /** What comes of a run. */
@@ -177,21 +325,44 @@ struct RunOutcome
   std::string summary;  ///< one line
 };
 
-/** What runs can be told. */
-struct RunParams
+/** Whether a process is roslaunch, itself or as a script that an interpreter runs. */
+inline bool isRoslaunch(pid_t process)
 {
-  std::string world;
-  std::string start;
-  std::string view = "demo";
-  double timeout;
-};
+  std::ifstream file("/proc/" + std::to_string(process) + "/cmdline");
+  std::string argument;
+  for (int i = 0; i < 3 && std::getline(file, argument, '\0'); ++i)
+  {
+    if (argument.substr(argument.rfind('/') + 1) == "roslaunch")
+    {
+      return true;
+    }
+  }
+  return false;
+}
+
+/**
+ * Ends a run's process group in the way that leaves nothing red on the terminal: roslaunch, when it is the parent, is asked
+ * to end as Ctrl-C asks it, and it then ends this process with the others. Did this process end first, roslaunch would
+ * report that a required process has died, which is right only when it crashes.
+ */
+inline void endWithRoslaunch()
+{
+  constexpr double LONGEST = 20.0;  // until roslaunch ends this process [s]
+  const pid_t parent = getppid();
+  if (ros::ok() && isRoslaunch(parent) && kill(parent, SIGINT) == 0)
+  {
+    waitUntilReady(LONGEST, [] { return std::string("roslaunch does not end"); });
+  }
+}
 
 /**
  * main() of a program that runs a simulated robot once. Parameters, all private:
- *  - `~world`, `~start` (string), `~timeout` (double [s]), with the program's defaults;
+ *  - `~world`, `~start` (string), `~timeout` (double [s], > 0), with the program's defaults;
  *  - `~view` (string, default "demo"): the name that the view is stored by;
+ *  - `~patience` (double, default START_PATIENCE [s], > 0): longest wait for other nodes to be there and to answer;
  *  - `~result` (string, default ""): file that the outcome is written to, 0 or 1 and a line;
- *  - `~exit` (bool, default true): end afterwards, with status 0 when the robot is at the view and 1 when not.
+ *  - `~exit` (bool, default true): end afterwards, with status 0 when the robot is at the view and 1 when not, and let
+ *    roslaunch end, too, when that has started the program.
  *
  * @param what of the run, for the line that is printed.
  * @param run does it; what it throws is the outcome, too.
@@ -205,6 +376,25 @@ inline int runSimulation(int argc, char** argv, const std::string& name, const s
   spinner.start();
   bool exit = true;
   std::string result_file;
+  const auto end = [&](const RunOutcome& outcome) {
+    (outcome.success ? std::cout : std::cerr) << what << ": " << outcome.summary << std::endl;
+    if (!result_file.empty())
+    {
+      std::ofstream(result_file) << (outcome.success ? 0 : 1) << ' ' << outcome.summary << std::endl;
+    }
+    if (exit)
+    {
+      endWithRoslaunch();
+    }
+    else
+    {
+      ros::waitForShutdown();
+    }
+    return outcome.success ? 0 : 1;
+  };
+  params.give_up = [&](const std::string& why) {
+    std::_Exit(end({ false, "failed: " + why }));
+  };
   RunOutcome outcome;
   try
   {
@@ -213,6 +403,9 @@ inline int runSimulation(int argc, char** argv, const std::string& name, const s
     reader.read("start", params.start);
     reader.read("view", params.view);
     reader.read("timeout", params.timeout);
+    reader.require(params.timeout > 0.0, "~timeout must be positive [s]");
+    reader.read("patience", params.patience);
+    reader.require(params.patience > 0.0, "~patience must be positive [s]");
     reader.read("result", result_file);
     reader.read("exit", exit);
     reader.finish();
@@ -222,16 +415,7 @@ inline int runSimulation(int argc, char** argv, const std::string& name, const s
   {
     outcome = { false, "failed: " + oneLine(error) };
   }
-  std::cout << what << ": " << outcome.summary << std::endl;
-  if (!result_file.empty())
-  {
-    std::ofstream(result_file) << (outcome.success ? 0 : 1) << ' ' << outcome.summary << '\n';
-  }
-  if (!exit)
-  {
-    ros::waitForShutdown();
-  }
-  return outcome.success ? 0 : 1;
+  return end(outcome);
 }
 
 }  // namespace view_servo

@@ -49,7 +49,7 @@ struct ViewStoreNodeParams
  *
  * Parameters, all private:
  *  - `~fixed_frame` (string, default "odom"): the camera's pose is stored in this frame, where tf knows it; "" = never;
- *  - `~views_dir`, `~allow_paths`: see ImageSourceReader;
+ *  - `~views_dir`, `~allow_paths`, `~image_patience`: see ImageSourceReader;
  *  - `~image_transport`, `~queue_size`, `~max_image_age`: see CameraInput.
  *
  * Subscribes:

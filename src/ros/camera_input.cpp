@@ -4,6 +4,7 @@
 
 #include "view_servo/ros/conversions.h"
 #include "view_servo/ros/node_base.h"
+#include "view_servo/ros/readiness.h"
 #include "view_servo/views/image_io.h"
 
 #include <ros/console.h>
@@ -95,6 +96,22 @@ std::string CameraInput::missing(CameraFrame& frame, const CameraFrame& before) 
   {
     return oneLine(error);
   }
+}
+
+CameraFrame CameraInput::latest(double patience) const
+{
+  const std::unique_lock<std::mutex> alone(waiting_mutex_, std::try_to_lock);
+  if (!alone)
+  {
+    return latest();
+  }
+  CameraFrame frame;
+  const std::string lacking = waitUntilReady(patience, [&] { return missing(frame); });
+  if (!lacking.empty())
+  {
+    throw ImageError(lacking);
+  }
+  return frame;
 }
 
 void CameraInput::diagnose(diagnostic_updater::DiagnosticStatusWrapper& status)

@@ -74,11 +74,13 @@ ImageSourceParams ImageSourceParams::read(ParameterReader& reader)
   ImageSourceParams params;
   params.views_dir = readViewsDir(reader);
   reader.read("allow_paths", params.allow_paths);
+  reader.read("image_patience", params.image_patience);
+  reader.require(params.image_patience >= 0.0, "~image_patience must not be negative [s]");
   return params;
 }
 
 ImageSourceReader::ImageSourceReader(const ImageSourceParams& params, const CameraInput& camera)
-  : allow_paths_(params.allow_paths), store_(params.views_dir), camera_(camera)
+  : allow_paths_(params.allow_paths), image_patience_(params.image_patience), store_(params.views_dir), camera_(camera)
 {
 }
 
@@ -89,7 +91,7 @@ SourcedImage ImageSourceReader::read(const ImageSource& source, const std::strin
   {
     case SourceKind::CAMERA:
     {
-      const CameraFrame frame = camera_.latest();
+      const CameraFrame frame = camera_.latest(image_patience_);
       result.grey = toGrey(*frame.image, camera_.imageTopic());
       result.header = frame.image->header;
       result.camera = toCamera(*frame.info);

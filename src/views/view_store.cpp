@@ -441,7 +441,7 @@ void ViewStore::save(const StoredView& view, bool overwrite) const
     const fs::path yaml = yamlPath(directory_, view.name);
     if (!overwrite && fs::exists(yaml))
     {
-      fail("save", view.name, "there is one of that name");
+      fail("save", view.name, "there is one of that name; overwrite: true replaces it");
     }
     std::vector<unsigned char> encoded;
     cv::imencode(".png", view.image, encoded);

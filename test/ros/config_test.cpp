@@ -36,7 +36,7 @@ void expectEveryParameterAtItsDefault(const std::string& file, const std::vector
 }
 
 const std::vector<std::string> OF_MATCHERS = {
-  "view", "rate", "views_dir", "allow_paths", "image_transport", "queue_size", "max_image_age"
+  "view", "rate", "views_dir", "allow_paths", "image_transport", "queue_size", "max_image_age", "image_patience"
 };
 
 TEST(Config, PointMatcherHasEveryParameterAtItsDefault)

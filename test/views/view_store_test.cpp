@@ -252,7 +252,8 @@ TEST_F(ViewStoreTest, isEmptyWithoutADirectory)
 TEST_F(ViewStoreTest, overwritesOnlyWhenAllowed)
 {
   store_.save(plainView("desk", 1), false);
-  EXPECT_ERROR(store_.save(plainView("desk", 2), false), "there is one of that name");
+  EXPECT_ERROR(store_.save(plainView("desk", 2), false),
+               "cannot save view 'desk': there is one of that name; overwrite: true replaces it");
   expectSame(store_.load("desk"), plainView("desk", 1));
   store_.save(plainView("desk", 2), true);
   expectSame(store_.load("desk"), plainView("desk", 2));

@@ -68,6 +68,14 @@ public:
   /** Why the newest image cannot be used with its calibration, whatever it shows; empty: it can, or none came. */
   std::string fault() const;
 
+  /**
+   * The same, as soon as there is one: a camera may start later than its node. The wait is by a steady clock, and logged.
+   * Only one caller waits at a time, and others are answered at once: who waits takes one of the spinner's few threads, and
+   * images come by them, too.
+   * @param patience longest wait [s].
+   */
+  CameraFrame latest(double patience) const;
+
   /** Where images come from, resolved. */
   std::string imageTopic() const
   {
@@ -86,7 +94,8 @@ private:
   CameraInputParams params_;
   Callback on_frame_;
   std::function<void(const std::string&)> on_problem_;
-  mutable std::mutex mutex_;
+  mutable std::mutex waiting_mutex_;  // held by the one who waits; taken before mutex_
+  mutable std::mutex mutex_;          // guards what follows, up to the transport
   CameraFrame latest_;
   std::string fault_;    // of the last pair
   std::string problem_;  // why the last frame was not usable, or none came

@@ -52,6 +52,7 @@ struct ImageSourceParams
 {
   std::filesystem::path views_dir;
   bool allow_paths = true;
+  double image_patience = 5.0;
 
   static ImageSourceParams read(ParameterReader& reader);
 };
@@ -60,7 +61,9 @@ struct ImageSourceParams
  * Turns the ImageSource of a request into an image. Parameters:
  *  - `~views_dir` (string, default "" = $ROS_HOME/view_servo/views): where stored views are;
  *  - `~allow_paths` (bool, default true): whether requests may name files. They are read with the node's rights, so
- *    turn it off where requests come from strangers.
+ *    turn it off where requests come from strangers;
+ *  - `~image_patience` (double, default 5.0 [s], >= 0): longest wait for the camera's image, when a request wants that and
+ *    none has come yet.
  */
 class ImageSourceReader
 {
@@ -78,6 +81,7 @@ public:
 
 private:
   bool allow_paths_;
+  double image_patience_;
   ViewStore store_;
   const CameraInput& camera_;
 };

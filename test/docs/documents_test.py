@@ -1,0 +1,528 @@
+#!/usr/bin/python3
+# Copyright (c) 2026, the view_servo authors
+# SPDX-License-Identifier: BSD-3-Clause
+"""
+Tries what the documents say. Every command in an indented block, or in backticks, is run, or as much of it as harms nothing;
+every name in backticks has to be known to running nodes, or to the sources; C++ and CMake are built; links lead to files.
+A command of a form that is not known here, or a name that nothing explains, is a failure: teach this test what to do.
+"""
+import collections
+import functools
+import glob
+import os
+import re
+import shlex
+import shutil
+import subprocess
+import sys
+import tempfile
+import time
+import unittest
+
+import yaml
+
+sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))
+import documents  # noqa: E402
+import graph  # noqa: E402
+
+import genpy  # noqa: E402
+import roslaunch.arg_dump  # noqa: E402
+import roslaunch.config  # noqa: E402
+import roslaunch.xmlloader  # noqa: E402
+import roslib.message  # noqa: E402
+import roslib.packages  # noqa: E402
+import rospkg  # noqa: E402
+
+ROOT = documents.ROOT
+PACKAGE = "view_servo"
+PATIENCE = 120.0  # for one command [s]
+
+# Commands that are not run, and why not.
+NOT_RUN = {
+    "scripts/demo": "it is this test's big brother, and takes minutes",
+    "scripts/demo arm": "likewise",
+    "scripts/demo match": "likewise",
+    "scripts/test": "it runs this test",
+    "scripts/install_dependencies": "it may change the machine",
+    "scripts/build": "it has been run, else there would be nothing to test",
+    "catkin_make": "it needs a workspace, and builds everything anew",
+    "catkin build": "likewise",
+}
+
+# Names that no node and no source explains, and what they are.
+KNOWN_NAMES = {
+    "x_cur ~ H x_ref": "a formula",
+    "src": "of a catkin workspace",
+    "$ROS_HOME/view_servo/views": "a directory of the user's",
+    "NAME.yaml": "a file of the user's",
+    "<depend>view_servo</depend>": "a line of the user's package.xml",
+    "camera_calibration": "a package of ROS that need not be installed",
+    "clang-format": "a tool",
+    "clang-tidy": "a tool",
+    "CamelCase": "a style",
+    "camelCase": "a style",
+    "under_scored": "a style",
+    "UPPER_CASE": "a style",
+}
+
+
+class Documented(unittest.TestCase):
+    """Holds what all tests share: running nodes and their files."""
+
+    maxDiff = None
+
+    @classmethod
+    def setUpClass(cls):
+        cls.directory = tempfile.mkdtemp(prefix="view_servo_documents_")
+        cls.documents = [documents.Document(path) for path in documents.documents()]
+        cls.graphs = []
+        cls.ran = {}
+        try:
+            cls.start_graphs()
+            cls.make_files()
+        except BaseException:
+            cls.tearDownClass()
+            raise
+
+    @classmethod
+    def start_graphs(cls):
+        wanted = [
+            (["nomad_sim.launch", "homing.launch"], ["/nomad_sim/set_pose", "/homing/enable", "/view_store/save",
+                                                     "/point_matcher/match", "/line_matcher/match"]),
+            (["puma_sim.launch", "arm_servo.launch"], ["/puma_sim/set_pose", "/servo_25d/enable", "/view_store/save",
+                                                       "/homography_tracker/start"]),
+        ]
+        for files, _ in wanted:
+            directory = os.path.join(cls.directory, files[0].split("_")[0])
+            os.mkdir(directory)
+            running = graph.Graph(directory)
+            cls.graphs.append(running)
+            running.start("roslaunch", PACKAGE, files[0])
+            running.start("roslaunch", PACKAGE, files[1], "sim:=false")
+        for running, (_, services) in zip(cls.graphs, wanted):
+            try:
+                for service in services:
+                    graph.wait_until(service, lambda: service in running.state()[2])
+                graph.wait_until("a camera", lambda: "/camera/image_raw" in running.state()[0])
+            except AssertionError as error:
+                raise AssertionError("%s\n%s" % (error, running.log()))
+
+    @classmethod
+    def make_files(cls):
+        """Pictures and a bag, under the names that documents give to the user's own."""
+        base = cls.graphs[0]
+        for name, x in (("goal", 0.0), ("now", -0.15)):
+            pose = "{pose: {position: {x: %g}, orientation: {w: 1.0}}}" % x
+            for call in ("/nomad_sim/set_pose '%s'" % pose, "/view_store/save '{name: picture_%s}'" % name):
+                time.sleep(0.3)  # an image from there
+                status, text = base.run("rosservice call " + call, PATIENCE)
+                assert status == 0 and "success: True" in text, text
+            picture = glob.glob(os.path.join(base.directory, "view_servo", "views", "picture_%s*.png" % name))[0]
+            shutil.copy(picture, os.path.join(base.directory, name + ".png"))
+        shutil.copy(os.path.join(base.directory, "goal.png"), os.path.join(base.directory, "graf1.png"))
+        shutil.copy(os.path.join(base.directory, "now.png"), os.path.join(base.directory, "graf3.png"))
+
+    @classmethod
+    def tearDownClass(cls):
+        for running in cls.graphs:
+            running.stop()
+        shutil.rmtree(cls.directory, ignore_errors=True)
+
+    # ------------------------------------------------------------------------------------------------ of the package
+
+    @staticmethod
+    @functools.lru_cache(maxsize=None)
+    def launch_arguments(file):
+        return roslaunch.arg_dump.get_args([os.path.join(ROOT, "launch", file)])
+
+    @staticmethod
+    @functools.lru_cache(maxsize=None)
+    def programs():
+        """Files that rosrun finds."""
+        found = subprocess.run(["catkin_find", "--without-underlays", "--libexec", PACKAGE], stdout=subprocess.PIPE,
+                               check=True).stdout.decode().split("\n")
+        return {name for folder in found if folder for name in os.listdir(folder)}
+
+    def run_here(self, command, expected=0):
+        """Runs a command beside the files that were made, once."""
+        if command not in self.ran:
+            self.ran[command] = self.graphs[0].run(command, PATIENCE)
+        status, text = self.ran[command]
+        self.assertEqual(status, expected, "%s\n%s" % (command, text))
+        return text
+
+    # ---------------------------------------------------------------------------------------------- kinds of commands
+
+    def try_command(self, text):
+        text = text.replace("/tmp/", self.graphs[0].directory + "/")
+        for part in text.split(" && "):
+            words = shlex.split(part)
+            while words and re.match(r"[A-Z_]+=", words[0]):
+                words.pop(0)
+            if words[0].endswith(".launch"):
+                words[:0] = ["roslaunch", PACKAGE]
+            elif words[0] in self.programs() | {"plot_run", "plot_experiment"} and len(words) > 1:
+                words[:0] = ["rosrun", PACKAGE]
+            self.kind_of(words)(words)
+
+    def kind_of(self, words):
+        kinds = {"roslaunch": self.try_roslaunch, "rosrun": self.try_rosrun, "rosservice": self.try_rosservice,
+                 "rostopic": self.try_rostopic, "source": self.try_source}
+        if words[0] in kinds:
+            return kinds[words[0]]
+        if words[0].startswith("scripts/"):
+            return self.try_script
+        if words[0].startswith("devel/lib/"):
+            return self.try_binary
+        if words[0].startswith("bench_"):
+            return self.try_binary
+        if " ".join(words) in NOT_RUN:
+            return lambda _: None
+        raise AssertionError("nothing is known of this form of command")
+
+    def try_source(self, words):
+        self.assertEqual(words[1:], ["devel/setup.bash"])
+        spaces = os.environ["CMAKE_PREFIX_PATH"].split(":")
+        self.assertTrue(os.path.exists(os.path.join(spaces[0], "setup.bash")), spaces)
+
+    def try_script(self, words):
+        script = os.path.join(ROOT, words[0])
+        self.assertTrue(os.access(script, os.X_OK), script)
+        if words[0] == "scripts/demo":
+            known = self.run_here("%s there_is_no_such_one" % script, expected=2)
+            self.assertTrue(set(words[1:]) <= set(re.findall(r"\w+", known.split("there are:")[1])), known)
+        elif words[0] == "scripts/install_dependencies":
+            known = self.run_here("%s there_is_no_such_one" % script, expected=2)
+            self.assertTrue(set(words[1:]) <= set(re.findall(r"\w+", known.split("known:")[1])), known)
+        elif words[0] == "scripts/build":
+            targets = [word for word in words[1:] if not word.startswith("-D")]
+            with open(os.path.join(ROOT, "CMakeLists.txt")) as file:
+                text = file.read()
+            for target in targets:
+                self.assertTrue(target == "tests" or "add_custom_target(%s" % target in text, target)
+        else:
+            self.assertIn(" ".join(words), NOT_RUN)
+
+    def try_binary(self, words):
+        """Benchmarks, which are not built for tests, and tests themselves: the sources have to know what is asked for."""
+        name = os.path.basename(words[0])
+        if name.startswith("bench_"):
+            source = os.path.join(ROOT, "bench", name + ".cpp")
+        else:
+            room, test = name.split("_", 1)
+            source = os.path.join(ROOT, "test", room, test + ".cpp")
+        with open(source) as file:
+            text = file.read()
+        for word in words[1:]:
+            match = re.fullmatch(r"--gtest_filter=\*(\w+)\*", word)
+            self.assertTrue(match and match.group(1) in text or '"%s"' % word in text, word)
+
+    def try_roslaunch(self, words):
+        if words[1] == "--ros-args":
+            self.run_here(" ".join(words))
+            words = words[:1] + words[2:]
+        self.assertEqual(words[1], PACKAGE)
+        arguments = words[3:]
+        self.assertTrue(all(":=" in argument for argument in arguments), arguments)
+        known = self.launch_arguments(words[2])
+        for argument in arguments:
+            self.assertIn(argument.split(":=")[0], known)
+        config = roslaunch.config.ROSLaunchConfig()
+        loader = roslaunch.xmlloader.XmlLoader()
+        loader.load(os.path.join(ROOT, "launch", words[2]), config, argv=arguments, verbose=False)
+        self.assertTrue(config.nodes)
+        for node in config.nodes:
+            if node.package == "rviz" and not self.is_installed("rviz"):
+                continue
+            self.assertEqual(len(set(roslib.packages.find_node(node.package, node.type))), 1, node.type)
+
+    @staticmethod
+    def is_installed(package):
+        return package in rospkg.RosPack().list()
+
+    def try_rosrun(self, words):
+        package, program, arguments = words[1], words[2], words[3:]
+        if package == "image_view":
+            self.assert_topic(arguments[0].split(":=")[1], "sensor_msgs/Image")
+            with open(os.path.join(ROOT, "scripts", "install_dependencies")) as file:
+                self.assertIn("ros-image-view", file.read())
+            if self.is_installed(package):
+                self.assertTrue(roslib.packages.find_node(package, program))
+            return
+        self.assertEqual(package, PACKAGE)
+        if "..." in arguments or "NAME" in arguments:
+            self.run_here("rosrun %s %s --help" % (package, program))
+            return
+        if program == "record_bag":
+            arguments = arguments + ["--rate", "1"]
+        if program == "plot_run":
+            self.record_run(arguments[0])
+        if program == "experiments" and arguments[0] != "--list":
+            self.assertIn(arguments[0], self.run_here("rosrun view_servo experiments --list").split())
+            return
+        redirected = arguments.index(">") if ">" in arguments else len(arguments)
+        self.run_here(" ".join(["rosrun", package, program] + [shlex.quote(argument) for argument in
+                                                              arguments[:redirected]] + arguments[redirected:]))
+
+    def record_run(self, bag):
+        """Records what homing tells during a goal."""
+        if os.path.exists(bag):
+            return
+        base = self.graphs[0]
+        base.run("rosservice call /view_store/save '{name: recorded}'", PATIENCE)
+        base.run("rosservice call /homing/enable 'data: true'", PATIENCE)
+        recording = base.start("rosbag", "record", "--output-name=" + bag, "--duration=8", "/heading", "/status", "/odom",
+                               "/ground_truth", "/cmd_vel_stamped")
+        graph.wait_until("the recorder", lambda: any(node.startswith("/record") for node in
+                                                     base.state()[1].get("/heading", [])))
+        base.run("rostopic pub -1 /home/goal view_servo/HomeToViewActionGoal '{goal: {view: recorded}}'", PATIENCE)
+        recording.wait(PATIENCE)
+        base.run("rosservice call /homing/enable 'data: false'", PATIENCE)
+
+    def graph_with(self, kind, name):
+        """The running nodes that have a topic (kind 0 or 1) or a service (2)."""
+        for running in self.graphs:
+            if name in running.state()[kind]:
+                return running
+        return None
+
+    def assert_topic(self, name, type_name):
+        types = {running.topic_types().get(name) for running in self.graphs}
+        self.assertIn(type_name, types, "%s is not a topic of that type" % name)
+
+    def try_rosservice(self, words):
+        self.assertEqual(words[1], "call")
+        running = self.graph_with(2, words[2])
+        self.assertIsNotNone(running, "there is no service %s" % words[2])
+        command = "rosservice call %s" % " ".join(shlex.quote(word) for word in words[2:])
+        status, text = running.run(command, PATIENCE)
+        self.assertEqual(status, 0, text)
+        self.assertIn("success: True", text)
+
+    def try_rostopic(self, words):
+        if words[1] == "echo":
+            name, field = words[2], []
+            while not any(name in running.topic_types() for running in self.graphs):
+                self.assertIn("/", name[1:], "there is no topic %s" % words[2])
+                name, last = name.rsplit("/", 1)
+                field.insert(0, last)
+            type_name = next(running.topic_types()[name] for running in self.graphs if name in running.topic_types())
+            message = roslib.message.get_message_class(type_name)()
+            for part in field:
+                message = getattr(message, part)
+            return
+        self.assertEqual(words[1], "pub")
+        values = words[2:]
+        while values[0].startswith("-"):
+            option = values.pop(0)
+            self.assertIn(option, ("-1", "-r"))
+            if option == "-r":
+                float(values.pop(0))
+        topic, type_name, content = values
+        subscribers = {node for running in self.graphs for node in running.state()[1].get(topic, [])
+                       if running.topic_types().get(topic) == type_name}
+        self.assertTrue(subscribers, "nobody subscribes %s as %s" % (topic, type_name))
+        genpy.message.fill_message_args(roslib.message.get_message_class(type_name)(), [yaml.safe_load(content)])
+
+    # -------------------------------------------------------------------------------------------------------- commands
+
+    COMMAND_STARTS = ("roslaunch ", "rosrun ", "rosservice ", "rostopic ", "scripts/", "source ", "catkin_make", "catkin ")
+
+    def is_command(self, text):
+        text = re.sub(r"^[A-Z_]+=\S+ ", "", text)
+        first = text.split(" ")[0]
+        return text.startswith(self.COMMAND_STARTS) or " " in text and (
+            first in self.programs() | {"plot_run", "plot_experiment"} or first.startswith("bench_") or
+            first.endswith(".launch"))
+
+    def test_commands(self):
+        count = 0
+        for document in self.documents:
+            commands = document.commands + [documents.Command(*name) for name in document.names
+                                            if self.is_command(name.text)]
+            for command in commands:
+                with self.subTest(where=command.place, command=command.text):
+                    count += 1
+                    begin = time.monotonic()
+                    try:
+                        self.try_command(command.text)
+                    finally:
+                        print("%5.1f s  %s  %s" % (time.monotonic() - begin, command.place, command.text), flush=True)
+        self.assertGreater(count, 30)
+
+    # ----------------------------------------------------------------------------------------------------------- names
+
+    def parameters(self):
+        """Names that nodes take, by the sources that read them and by the files in config/."""
+        names = set()
+        for path in glob.glob(os.path.join(ROOT, "src", "**", "*.*"), recursive=True) + \
+                glob.glob(os.path.join(ROOT, "include", "**", "*.h"), recursive=True):
+            with open(path) as file:
+                names.update(re.findall(r"(?:read|expect)\(\"(\w+)\"", file.read()))
+        for path in glob.glob(os.path.join(ROOT, "config", "*.yaml")):
+            with open(path) as file:
+                for key, value in yaml.safe_load(file).items():
+                    names.add(key)
+                    names.update(value if isinstance(value, dict) else [])
+        for path in [os.path.join(ROOT, "docs", "parameters.md")]:
+            for row in documents.Document(os.path.relpath(path, ROOT)).rows:
+                names.update(re.findall(r"\w+", row.cells[1]))  # values that words stand for
+        return names
+
+    def fields(self):
+        """Names of fields of this package's messages, services and actions, and of a twist."""
+        names = {"linear", "angular", "x", "y", "z", "x_offset", "y_offset", "width", "height"}
+        for path in glob.glob(os.path.join(ROOT, "*", "*.msg")) + glob.glob(os.path.join(ROOT, "*", "*.srv")) + \
+                glob.glob(os.path.join(ROOT, "*", "*.action")):
+            with open(path) as file:
+                names.update(re.findall(r"^\S+\s+(\w+)", file.read(), re.MULTILINE))
+        return names
+
+    def type_exists(self, name):
+        full = name if "/" in name else PACKAGE + "/" + name
+        if os.path.exists(os.path.join(ROOT, "action", full.split("/")[1] + ".action")):
+            return True
+        for find in (roslib.message.get_message_class, roslib.message.get_service_class):
+            try:
+                if find(full) is not None:
+                    return True
+            except (ImportError, ValueError):
+                pass
+        return False
+
+    def test_names(self):
+        parameters, fields, programs = self.parameters(), self.fields(), self.programs()
+        arguments = {name for path in glob.glob(os.path.join(ROOT, "launch", "*.launch"))
+                     for name in self.launch_arguments(os.path.basename(path))}
+        known = set()
+        for running in self.graphs:
+            publishers, subscribers, services = running.state()
+            known.update(publishers, subscribers, services, running.nodes())
+        known.update(name[:-len("/goal")] for name in list(known) if name.endswith("/goal"))
+        last_parts = {name.split("/")[-1] for name in known}
+        sources = ""
+        for path in glob.glob(os.path.join(ROOT, "include", "**", "*.h"), recursive=True) + \
+                glob.glob(os.path.join(ROOT, "src", "**", "*.*"), recursive=True) + \
+                [os.path.join(ROOT, name) for name in ("CMakeLists.txt", "package.xml", "scripts/plot_run")]:
+            with open(path) as file:
+                sources += file.read()
+        words = set(re.findall(r"\w+", sources.replace("${PROJECT_NAME}", PACKAGE)))
+
+        def is_known(text):
+            if text in KNOWN_NAMES or self.is_command(text) or "/" + text.lstrip("/") in known:
+                return True
+            if text.startswith("~"):
+                return text[1:] in parameters | last_parts
+            if ":=" in text:
+                return all(part.split(":=")[0] in arguments for part in text.split(" "))
+            match = re.match(r"(\w+):( |$)", text)
+            if match:
+                return match.group(1) in parameters | fields
+            match = re.fullmatch(r"#include <view_servo/(\w+)\.h>", text)
+            if match:
+                return self.type_exists(match.group(1))
+            if os.path.exists(os.path.join(ROOT, text)) or glob.glob(os.path.join(ROOT, "*", text)) or \
+                    glob.glob(os.path.join(ROOT, "*", "*", text + ".*")):
+                return True
+            if re.fullmatch(r"\w+/?\w+", text) and self.type_exists(text):
+                return True
+            if re.fullmatch(r"-?-[\w-]+( [\w=]+)?", text):
+                return text.split(" ")[0].lstrip("-") in sources
+            parts = text.split(".")
+            return text in programs | parameters or all(part in fields for part in parts) or text.replace("()", "") in words
+
+        for document in self.documents:
+            for name in document.names:
+                with self.subTest(where=name.place, name=name.text):
+                    self.assertTrue(is_known(name.text), "nothing explains this name")
+
+    def test_tables_of_nodes(self):
+        """Services, actions and topics have the types, and the direction, that the tables say."""
+        count = 0
+        for row in self.documents[0].rows:
+            section = re.fullmatch(r"`(\w+)`", row.section)
+            if not section or len(row.cells) != 3 or row.head[0] not in ("service", "action, service", "topic"):
+                continue
+            node = "/" + section.group(1)
+            running = self.graph_of(node)
+            names = [name for name in re.findall(r"`([^`]+)`", row.cells[0])]
+            types = [name for name in re.findall(r"`([^`]+)`", row.cells[1])]
+            with self.subTest(where=row.place, row=row.cells[0]):
+                self.assertIsNotNone(running, "there is no node %s" % node)
+                for index, name in enumerate(names):
+                    count += 1
+                    type_name = types[min(index, len(types) - 1)] if types else None
+                    self.assert_offered(running, node, name, type_name, row)
+        self.assertGreater(count, 30)
+
+    def graph_of(self, node):
+        return next((running for running in self.graphs if node in running.nodes()), None)
+
+    def assert_offered(self, running, node, name, type_name, row):
+        full_type = type_name if type_name is None or "/" in type_name else PACKAGE + "/" + type_name
+        publishers, subscribers, services = running.state()
+        if row.head[0] == "service" or row.head[0].startswith("action") and name.startswith("~"):
+            self.assertIn(node, services.get(node + "/" + name[1:], []))
+            self.assertTrue(self.type_exists(type_name), type_name)
+            return
+        if row.head[0].startswith("action"):
+            self.assertIn(node, subscribers.get("/" + name + "/goal", []))
+            self.assertEqual(running.topic_types()["/" + name + "/goal"], full_type + "ActionGoal")
+            return
+        here = publishers if "(published" in row.cells[0] else subscribers
+        if name.startswith("~"):
+            found = [node + "/" + name[1:]]
+        else:  # launch files give other names to what a node subscribes
+            found = [topic for topic in here if topic.split("/")[-1] == name and node in here[topic]]
+        self.assertTrue(found and node in here.get(found[0], []), "%s has no such topic %s" % (node, name))
+        if full_type:
+            self.assertEqual(running.topic_types()[found[0]], full_type)
+
+    def test_parameter_tables(self):
+        """docs/parameters.md has the names and the defaults of the files in config/."""
+        files = {"Points": "point_matcher", "Lines": "line_matcher", "Homing": "homing",
+                 "Homography tracker": "homography_tracker", "2.5D servoing": "servo_25d"}
+        document = next(one for one in self.documents if one.path.endswith("parameters.md"))
+        count = collections.Counter()
+        for row in document.rows:
+            with self.subTest(where=row.place, row=row.cells[0]):
+                with open(os.path.join(ROOT, "config", files[row.section] + ".yaml")) as file:
+                    values = yaml.load(file, Loader=yaml.BaseLoader)
+                value, default = values[row.cells[0].strip("`")], row.cells[2]
+                count[row.section] += 1
+                try:
+                    self.assertEqual(float(value), float(default))
+                except ValueError:
+                    self.assertEqual(value, default)
+        self.assertEqual(set(count), set(files))
+
+    # --------------------------------------------------------------------------------------------- links and sources
+
+    def test_links(self):
+        for document in self.documents:
+            for link in document.links:
+                with self.subTest(where=link.place, link=link.text):
+                    self.assertTrue(os.path.exists(os.path.join(ROOT, os.path.dirname(document.path), link.text)))
+
+    def test_sources(self):
+        """The C++ is built by the CMake lines below it, and finds one picture in the other."""
+        sources = [source for document in self.documents for source in document.sources]
+        self.assertEqual({source.language for source in sources}, {"cpp", "cmake", "yaml"})
+        folder = os.path.join(self.directory, "find_goal")
+        os.mkdir(folder)
+        cpp = [source.text for source in sources if source.language == "cpp"]
+        cmake = [source.text for source in sources if source.language == "cmake"]
+        self.assertEqual((len(cpp), len(cmake)), (1, 1))
+        includes = [line for line in cpp[0].split("\n") if line.startswith("#include")]
+        body = [line for line in cpp[0].split("\n") if not line.startswith("#include")]
+        with open(os.path.join(folder, "find_goal.cpp"), "w") as file:
+            file.write("\n".join(includes + ["int main()", "{"] + body + ["}", ""]))
+        with open(os.path.join(folder, "CMakeLists.txt"), "w") as file:
+            file.write(cmake[0] + "\n")
+        for command in ("cmake -S {0} -B {0}/build -DPYTHON_EXECUTABLE=/usr/bin/python3", "cmake --build {0}/build"):
+            self.run_here(command.format(folder))
+        self.assertIn("[", self.run_here("%s/build/find_goal" % folder))
+
+
+if __name__ == "__main__":
+    unittest.main(warnings="ignore")  # ROS leaves sockets to the end

@@ -1,0 +1,107 @@
+# Copyright (c) 2026, the view_servo authors
+# SPDX-License-Identifier: BSD-3-Clause
+"""Running nodes that documents are compared with, each set of them under a master of its own."""
+import atexit
+import ctypes
+import os
+import signal
+import socket
+import subprocess
+import time
+import xmlrpc.client
+
+CALLER = "/documents"
+
+# A test that is ended from outside must not leave nodes behind. unittest goes on after SystemExit, not after this.
+signal.signal(signal.SIGTERM, signal.default_int_handler)
+
+
+def end_with_parent():
+    """Asks the kernel for a SIGINT when the parent ends, however that happens: a test that takes too long is killed."""
+    PR_SET_PDEATHSIG = 1
+    ctypes.CDLL(None).prctl(PR_SET_PDEATHSIG, signal.SIGINT)
+
+
+def free_port():
+    with socket.socket() as listener:
+        listener.bind(("localhost", 0))
+        return listener.getsockname()[1]
+
+
+def wait_until(what, holds, deadline=60.0):
+    """Waits until `holds()` is true, and returns that. Raises what is missing."""
+    end = time.monotonic() + deadline
+    while True:
+        try:
+            value = holds()
+            if value:
+                return value
+        except (OSError, xmlrpc.client.Error):
+            pass
+        if time.monotonic() > end:
+            raise AssertionError("waited %.0f s in vain for %s" % (deadline, what))
+        time.sleep(0.1)
+
+
+class Graph:
+    """A master and what roslaunch commands started under it."""
+
+    def __init__(self, directory):
+        self.directory = directory
+        port = free_port()
+        self.uri = "http://localhost:%d" % port
+        self.master = xmlrpc.client.ServerProxy(self.uri)
+        self.environment = dict(os.environ, ROS_MASTER_URI=self.uri, ROS_HOSTNAME="localhost", ROS_HOME=directory,
+                                PWD=directory, PYTHONUNBUFFERED="1")
+        self.environment.pop("ROS_NAMESPACE", None)
+        self.processes = []
+        atexit.register(self.stop)
+        self.start("roscore", "-p", str(port))
+        wait_until("a master", lambda: self.master.getPid(CALLER))
+
+    def start(self, *command):
+        name = "%s-%d.log" % (os.path.basename(command[0]), len(self.processes))
+        with open(os.path.join(self.directory, name), "wb") as log:
+            self.processes.append(subprocess.Popen(command, env=self.environment, cwd=self.directory, stdout=log,
+                                                   stderr=subprocess.STDOUT, start_new_session=True,
+                                                   preexec_fn=end_with_parent))
+        return self.processes[-1]
+
+    def run(self, command, timeout=60.0, **options):
+        """Runs a line as a shell does, and returns its status and what it printed."""
+        result = subprocess.run(["bash", "-c", command], env=self.environment, cwd=self.directory, timeout=timeout,
+                                stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, **options)
+        return result.returncode, result.stdout.decode(errors="replace")
+
+    def stop(self):
+        for process in reversed(self.processes):
+            if process.poll() is None:
+                process.send_signal(signal.SIGINT)
+        for process in reversed(self.processes):
+            try:
+                process.wait(20.0)
+            except subprocess.TimeoutExpired:
+                process.kill()
+                process.wait()
+        self.processes = []
+
+    # ----------------------------------------------------------------------------------------- what the master knows
+
+    def state(self):
+        """Publishers, subscribers, services: each a dictionary from name to nodes."""
+        return [dict(part) for part in self.master.getSystemState(CALLER)[2]]
+
+    def topic_types(self):
+        return dict(self.master.getTopicTypes(CALLER)[2])
+
+    def nodes(self):
+        return {node for part in self.state() for nodes in part.values() for node in nodes}
+
+    def log(self):
+        """The end of everything that was printed."""
+        texts = []
+        for name in sorted(os.listdir(self.directory)):
+            if name.endswith(".log"):
+                with open(os.path.join(self.directory, name), errors="replace") as file:
+                    texts.append("--- %s\n%s" % (name, file.read()[-3000:]))
+        return "\n".join(texts)
