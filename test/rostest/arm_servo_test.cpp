@@ -39,7 +39,7 @@ using Clock = std::chrono::steady_clock;
 using Commands = CommandsOf<geometry_msgs::TwistStamped>;
 using ActionClient = actionlib::SimpleActionClient<ServoToViewAction>;
 
-constexpr double STOPS_WITHIN = 0.3;  // of wall time, whatever fails [s]
+constexpr double STOPS_WITHIN = 0.3 * SLOWDOWN;  // of wall time, whatever fails [s]
 const cv::Rect REGION(100, 80, 301, 201);
 constexpr char CAMERA_FRAME[] = "camera_optical_frame";
 

@@ -45,7 +45,7 @@ using Clock = std::chrono::steady_clock;
 using Commands = CommandsOf<geometry_msgs::Twist>;
 using ActionClient = actionlib::SimpleActionClient<HomeToViewAction>;
 
-constexpr double STOPS_WITHIN = 0.3;  // of wall time, whatever fails [s]
+constexpr double STOPS_WITHIN = 0.3 * SLOWDOWN;  // of wall time, whatever fails [s]
 
 /** What there is to see, drawn once: the view, and what a base sees that stands 0.8 m before it. */
 struct Scene
