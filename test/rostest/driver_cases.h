@@ -36,7 +36,7 @@ TYPED_TEST_P(DriverCases, EndsInTimeWhenThePeerNeverAnswers)
   EXPECT_FALSE(final.success);
   EXPECT_NE(final.message.find("not begun within 1.5 s"), std::string::npos) << final.message;
   EXPECT_NE(final.message.find(TypeParam::SILENT), std::string::npos) << final.message;
-  EXPECT_LT(final.duration, 2.0);
+  EXPECT_LT(final.duration, 1.5 + STOPS_WITHIN);
 }
 
 TYPED_TEST_P(DriverCases, IsCancelledWhileItPrepares)
@@ -90,13 +90,13 @@ TYPED_TEST_P(DriverCases, RefusesAViewThatItsPeerRefuses)
 
 TYPED_TEST_P(DriverCases, RefusesAViewThatIsNotThere)
 {
-  this->expectToEnd([this] { this->send("unknown"); }, SimpleClientGoalState::ABORTED, "unknown", 2.0);
+  this->expectToEnd([this] { this->send("unknown"); }, SimpleClientGoalState::ABORTED, "unknown", 2.0 * SLOWDOWN);
 }
 
 TYPED_TEST_P(DriverCases, RefusesWhenDisabled)
 {
   this->enable(false);
-  this->expectToEnd([this] { this->send("goal"); }, SimpleClientGoalState::ABORTED, "call ~enable", 2.0);
+  this->expectToEnd([this] { this->send("goal"); }, SimpleClientGoalState::ABORTED, "call ~enable", 2.0 * SLOWDOWN);
 }
 
 TYPED_TEST_P(DriverCases, RefusesTimesThatAreNone)

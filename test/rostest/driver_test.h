@@ -32,8 +32,8 @@ namespace view_servo
 {
 namespace test
 {
-constexpr double STOPS_WITHIN = 0.3;  // of wall time, whatever fails [s]
-constexpr double ENDS_WITHIN = 1.0;   // after SIGINT [s]
+constexpr double STOPS_WITHIN = 0.3 * SLOWDOWN;  // of wall time, whatever fails [s]
+constexpr double ENDS_WITHIN = 1.0 * SLOWDOWN;   // after SIGINT [s]
 
 /** Stamps that no clock has: unset, the largest, next to it. */
 inline std::vector<ros::Time> extremeStamps()
@@ -317,7 +317,7 @@ protected:
       EXPECT_TRUE(waitUntil([this] { return client.getState().isDone(); })) << node.output();
       EXPECT_LT(std::chrono::duration<double>(Clock::now() - moment).count(), ENDS_WITHIN);
       EXPECT_EQ(node.exitStatus(), 0) << node.output();
-      EXPECT_LT(std::chrono::duration<double>(Clock::now() - moment).count(), 2.0);
+      EXPECT_LT(std::chrono::duration<double>(Clock::now() - moment).count(), 2.0 * SLOWDOWN);
       EXPECT_FALSE(commands.moving());
       EXPECT_LT(commands.lastMotionAfter(moment), STOPS_WITHIN);
       EXPECT_EQ(client.getState().getText(), "the node is shutting down");

@@ -76,7 +76,7 @@ protected:
     const ros::WallTime start = ros::WallTime::now();
     node.interrupt();
     EXPECT_EQ(node.exitStatus(), 0) << node.output();
-    EXPECT_LT((ros::WallTime::now() - start).toSec(), 2.0);
+    EXPECT_LT((ros::WallTime::now() - start).toSec(), 2.0 * SLOWDOWN);
   }
 
   static bool contains(const std::string& text, const std::string& part)

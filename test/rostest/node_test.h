@@ -35,7 +35,12 @@ namespace test
 {
 /** @file What the tests of nodes share: pictures with a known homography, a camera, waiting with a deadline. */
 
-constexpr double DEADLINE = 20.0;  // [s]; nothing here takes nearly as long on an idle machine
+#ifdef VIEW_SERVO_SLOWDOWN
+constexpr double SLOWDOWN = VIEW_SERVO_SLOWDOWN;  // of a build with sanitizers
+#else
+constexpr double SLOWDOWN = 1.0;
+#endif
+constexpr double DEADLINE = 20.0 * SLOWDOWN;  // [s]; nothing here takes nearly as long on an idle machine
 
 /** Calls `step` and asks `predicate`, often, until it holds or the deadline has passed. Wall time. */
 inline bool waitUntil(const std::function<bool()>& predicate, const std::function<void()>& step = nullptr)
