@@ -73,7 +73,7 @@ public:
     : context_(context),
       params_(params),
       images_(context.addInput("image", context.quoted("image_raw"), params.image_timeout)),
-      outcomes_(context.addInput("outcome of an image", context.quoted("image_raw"),
+      outcomes_(context.addInput("image that was worked on", context.quoted("image_raw"),
                                  OUTCOME_PATIENCE * params.image_timeout)),
       odometry_(context.addInput("odometry", context.quoted("odom"), params.odometry_timeout)),
       matches_(context.addInput("matches", context.quoted("point_matches") + " or " + context.quoted("line_matches"),

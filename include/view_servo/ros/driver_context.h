@@ -62,6 +62,7 @@ public:
   void restart()
   {
     watch_.feed();
+    problem_.clear();
   }
   /** Whether goals need it; at first they do. */
   void setNeeded(bool needed)
