@@ -148,11 +148,12 @@ public:
 
     image_publisher_ = images_.advertiseCamera("camera/image_raw", 2);
     ground_truth_publisher_ = nh_.advertise<geometry_msgs::PoseStamped>("ground_truth", 10);
-    command_subscriber_ = nh_.subscribe("cmd_vel", 1, &SimulationNode::command, this);
+    command_subscriber_ = subscribe<typename Robot::Command>(
+        "cmd_vel", 1, [this](const typename Robot::Command::ConstPtr& message) { command(message); });
     set_pose_service_ = serve("set_pose", &SimulationNode::setPose, this);
     set_light_service_ = serve("set_light", &SimulationNode::setLight, this);
     diagnostics_.add("robot", this, &SimulationNode::diagnose);
-    control_timer_ = nh_.createWallTimer(ros::WallDuration(1.0 / params_.control_rate), &SimulationNode::control, this);
+    control_timer_ = every(1.0 / params_.control_rate, "control", [this] { control(); });
     camera_thread_ = std::thread(&SimulationNode::runCamera, this);
     ROS_INFO_STREAM("world '" << world_.name << "', start '" << params_.start << "'");
   }
@@ -194,7 +195,7 @@ private:
     }
   }
 
-  void control(const ros::WallTimerEvent& /*event*/)
+  void control()
   {
     const std::lock_guard<std::mutex> lock(robot_mutex_);
     advance();
@@ -239,19 +240,11 @@ private:
 
   void runCamera()
   {
-    try
+    ros::WallRate rate(world_.camera_rate);
+    while (running_ && ros::ok())
     {
-      ros::WallRate rate(world_.camera_rate);
-      while (running_ && ros::ok())
-      {
-        takeImage();
-        rate.sleep();
-      }
-    }
-    catch (const std::exception& error)
-    {
-      ROS_FATAL_STREAM("the camera fails: " << error.what());
-      ros::shutdown();
+      guarded("the camera", [this] { takeImage(); });
+      rate.sleep();
     }
   }
 
