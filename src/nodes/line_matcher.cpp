@@ -9,6 +9,7 @@
 #include "view_servo/views/line_view_matcher.h"
 
 #include <chrono>
+#include <functional>
 #include <limits>
 #include <stdexcept>
 #include <string>
@@ -69,7 +70,8 @@ public:
     return { toGrouping(request.groups) };
   }
 
-  ViewMatch match(const PreparedImage& reference, const PreparedImage& current, const Options& options) const
+  ViewMatch match(const PreparedImage& reference, const PreparedImage& current, const Options& options,
+                  const std::function<bool()>& /*given_up*/) const
   {
     using Clock = std::chrono::steady_clock;
     const Clock::time_point start = Clock::now();

@@ -8,6 +8,7 @@
 #include "view_servo/ros/streaming_matcher.h"
 #include "view_servo/views/view_matcher.h"
 
+#include <functional>
 #include <limits>
 #include <stdexcept>
 #include <string>
@@ -76,9 +77,10 @@ public:
     return options;
   }
 
-  ViewMatch match(const PreparedImage& reference, const PreparedImage& current, const Options& options) const
+  ViewMatch match(const PreparedImage& reference, const PreparedImage& current, const Options& options,
+                  const std::function<bool()>& given_up) const
   {
-    return matcher_.match(reference, current, options.model, options.inlier_threshold);
+    return matcher_.match(reference, current, options.model, options.inlier_threshold, given_up);
   }
 
   static void fill(const ViewMatch& result, Service::Response& response)

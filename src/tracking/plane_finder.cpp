@@ -90,9 +90,10 @@ PlaneFinder::PlaneFinder(const ViewMatcherParams& params) : matcher_(params)
 {
 }
 
-ViewMatch PlaneFinder::match(const PreparedImage& view, const cv::Mat& image) const
+ViewMatch PlaneFinder::match(const PreparedImage& view, const cv::Mat& image,
+                             const std::function<bool()>& given_up) const
 {
-  return matcher_.match(view, PreparedImage(image, cv::Rect(), features()), GeometryModel::HOMOGRAPHY);
+  return matcher_.match(view, PreparedImage(image, cv::Rect(), features()), GeometryModel::HOMOGRAPHY, 0.0, given_up);
 }
 
 PlaneFinder::Answer PlaneFinder::find(const Question& question, const std::function<bool()>& given_up) const
@@ -102,7 +103,7 @@ PlaneFinder::Answer PlaneFinder::find(const Question& question, const std::funct
   {
     return notFound("the view has " + sizeOf(view.grey()) + " pixels, the image " + sizeOf(question.image));
   }
-  const ViewMatch first = match(view, question.image);
+  const ViewMatch first = match(view, question.image, given_up);
   if (first.outcome != MatchOutcome::MATCHED)
   {
     return notFound(first.message);
@@ -114,11 +115,11 @@ PlaneFinder::Answer PlaneFinder::find(const Question& question, const std::funct
   {
     return toAnswer(first);
   }
+  const ViewMatch second = match(view, withoutRegion(question.image, view.region(), first.matrix), given_up);
   if (given_up && given_up())
   {
-    return notFound("the search was given up");
+    return notFound("given up");
   }
-  const ViewMatch second = match(view, withoutRegion(question.image, view.region(), first.matrix));
   const bool rivals = second.outcome == MatchOutcome::MATCHED && second.inliers >= RIVALRY * first.inliers &&
                       isElsewhere(view.region(), first.matrix, second.matrix);
   if (!rivals)

@@ -514,7 +514,7 @@ ViewMatcher::ViewMatcher(const ViewMatcherParams& params) : params_(params)
 }
 
 ViewMatch ViewMatcher::match(const PreparedImage& reference, const PreparedImage& current, GeometryModel model,
-                             double inlier_threshold) const
+                             double inlier_threshold, const std::function<bool()>& given_up) const
 {
   if (!(inlier_threshold >= 0.0) || std::isinf(inlier_threshold))
   {
@@ -530,8 +530,14 @@ ViewMatch ViewMatcher::match(const PreparedImage& reference, const PreparedImage
   result.rms_error = NOT_A_NUMBER;
   StageClock clock(result.stages);
   bool any_features = false;
+  bool ended_early = false;
   for (const Trial& trial : trials(params_))
   {
+    ended_early = given_up && given_up();
+    if (ended_early)
+    {
+      break;
+    }
     reference.profileIndex(trial.levels.reference);
     clock.finish("reference");
     current.points(trial.levels.current);
@@ -564,6 +570,10 @@ ViewMatch ViewMatcher::match(const PreparedImage& reference, const PreparedImage
     result.message = std::to_string(result.inliers) + " of " + std::to_string(result.matches.size()) +
                      " matches agree with one " +
                      (model == GeometryModel::HOMOGRAPHY ? "homography" : "fundamental matrix");
+  }
+  else if (ended_early)
+  {
+    result.message = "given up";
   }
   else if (!any_features)
   {

@@ -25,9 +25,11 @@
 #include <std_msgs/Header.h>
 #include <opencv2/core/types.hpp>
 
+#include <atomic>
 #include <chrono>
 #include <condition_variable>
 #include <exception>
+#include <functional>
 #include <memory>
 #include <mutex>
 #include <optional>
@@ -81,7 +83,8 @@ struct MatchLabel
  *  - `static Params readParams(ParameterReader&)`, a constructor that takes those, and `FeatureParams features() const`;
  *  - `static void clear(Service::Response&)`, which sets what a refused request leaves unknown;
  *  - `static Options options(const Service::Request&)`, which throws when the request makes no sense;
- *  - `ViewMatch match(const PreparedImage& reference, const PreparedImage& current, const Options&) const`;
+ *  - `ViewMatch match(const PreparedImage& reference, const PreparedImage& current, const Options&, given_up) const`, which ends
+ *    early, if it can, once `given_up()` holds;
  *  - `static void fill(const ViewMatch&, Service::Response&)`, for the fields that are the service's own;
  *  - `static Message toMessage(const ViewMatch&, const MatchLabel&)`, whose reason is the match's message when nothing was found.
  */
@@ -163,7 +166,7 @@ private:
     std_msgs::Header header;
     const std::shared_ptr<const PreparedImage> reference = prepare(request.reference, "reference", header);
     const std::shared_ptr<const PreparedImage> query = prepare(request.query, "query", header);
-    const ViewMatch result = matching_.match(*reference, *query, options);
+    const ViewMatch result = matching_.match(*reference, *query, options, given_up_);
 
     if (request.overlay)
     {
@@ -225,6 +228,7 @@ private:
   /** Another choice is made. The mutex is held. */
   void begin()
   {
+    newest_.reset();  // it may be old
     last_result_ = Result();
     renewed_ = true;
     wake_.notify_all();
@@ -305,7 +309,7 @@ private:
         return { false, "nobody listens" };
       }
       const PreparedImage current(toGrey(*frame.image, camera_.imageTopic()), cv::Rect(), features_);
-      const ViewMatch result = matching_.match(*reference, current, typename Matching::Options());
+      const ViewMatch result = matching_.match(*reference, current, typename Matching::Options(), given_up_);
       matches_publisher_.publish(Matching::toMessage(result, label));
       if (wants_overlay)
       {
@@ -349,7 +353,10 @@ private:
   bool renewed_ = false;  // the choice, since the worker has looked
   std::optional<CameraFrame> newest_;
   Result last_result_;
-  bool stopping_ = false;
+  std::atomic<bool> stopping_{ false };
+  const std::function<bool()> given_up_ = [this] {
+    return stopping_ || !ros::ok();
+  };
 
   CameraInput camera_;
   ImageSourceReader sources_;

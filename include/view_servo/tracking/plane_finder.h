@@ -47,13 +47,13 @@ public:
   }
 
   /**
-   * @param given_up asked between the matches that it takes; once it holds, nothing is found. May be empty.
+   * @param given_up as in ViewMatcher::match(); once it holds, nothing is found.
    * @throws std::invalid_argument when the image has the wrong type.
    */
   Answer find(const Question& question, const std::function<bool()>& given_up = {}) const;
 
 private:
-  ViewMatch match(const PreparedImage& view, const cv::Mat& image) const;
+  ViewMatch match(const PreparedImage& view, const cv::Mat& image, const std::function<bool()>& given_up) const;
 
   ViewMatcher matcher_;
 };

@@ -14,6 +14,7 @@
 #include <Eigen/Core>
 
 #include <cstdint>
+#include <functional>
 #include <limits>
 #include <string>
 #include <vector>
@@ -128,9 +129,13 @@ public:
     return params_;
   }
 
-  /** Both images must have been prepared with params().points. @param inlier_threshold [px], 0 = as in the params. */
+  /**
+   * Both images must have been prepared with params().points.
+   * @param inlier_threshold [px], 0 = as in the params.
+   * @param given_up asked before each of the scales that are tried; once it holds, no more are. May be empty.
+   */
   ViewMatch match(const PreparedImage& reference, const PreparedImage& current, GeometryModel model,
-                  double inlier_threshold = 0.0) const;
+                  double inlier_threshold = 0.0, const std::function<bool()>& given_up = {}) const;
 
 private:
   ViewMatcherParams params_;
