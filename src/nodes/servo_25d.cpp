@@ -159,6 +159,7 @@ public:
   {
     task_ = std::move(task);
     task_->start = Clock::now();
+    camera_frame_ = info_->header.frame_id;
     joints_.rest();
     joint_states_.setNeeded(joint_states_.age() <= params_.joint_timeout);
     onCameraInfo(info_);  // it may have changed since

@@ -201,6 +201,7 @@ TEST_F(ArmServoTest, DrivesTowardsTheView)
   drive();
   const geometry_msgs::TwistStamped command = commands_.last();
   EXPECT_EQ(command.header.frame_id, CAMERA_FRAME);
+  EXPECT_EQ(commands_.first().header.frame_id, CAMERA_FRAME);  // that of the calibration, before any homography
   EXPECT_GT(command.twist.linear.x, 0.0);
   EXPECT_LT(std::abs(command.twist.linear.y), 1e-6);
   EXPECT_LE(toVector(command.twist.linear).norm(), 0.15 + 1e-9);

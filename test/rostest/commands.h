@@ -63,6 +63,11 @@ public:
     }
     return -1.0;
   }
+  Message first() const
+  {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    return list_.front().message;
+  }
   Message last() const
   {
     const std::lock_guard<std::mutex> lock(mutex_);
