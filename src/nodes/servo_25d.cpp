@@ -360,11 +360,6 @@ private:
     {
       return age > 0.0 ? "are " + seconds(age) + " old" : "are stamped " + seconds(-age) + " in the future";
     }
-    if (message.header.frame_id.empty())
-    {
-      return "name no camera frame";
-    }
-    camera_frame_ = message.header.frame_id;
     if (message.valid == 0)
     {
       const std::string reason = message.reason.empty() ? "the view is not in the image" : message.reason;
@@ -375,6 +370,11 @@ private:
       task_->acquiring = reason;
       return "";
     }
+    if (message.header.frame_id.empty())
+    {
+      return "name no camera frame";
+    }
+    camera_frame_ = message.header.frame_id;
     try
     {
       const PlaneView view = toPlaneView(message);
