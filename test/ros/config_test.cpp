@@ -65,8 +65,8 @@ TEST(Config, HomographyTrackerHasEveryParameterAtItsDefault)
 {
   PlaneTrackerParams params;
   expectEveryParameterAtItsDefault("homography_tracker.yaml", homographyTrackerParameters(params),
-                                   { "view", "views_dir", "odom_frame", "tf_patience", "match_period", "image_transport",
-                                     "queue_size", "max_image_age" });
+                                   { "view", "views_dir", "odom_frame", "tf_patience", "match_period",
+                                     "image_transport", "queue_size", "max_image_age" });
 }
 
 TEST(Config, ServoHasEveryParameterAtItsDefault)
