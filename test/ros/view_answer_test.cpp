@@ -1,0 +1,90 @@
+// Copyright (c) 2026, the view_servo authors
+// SPDX-License-Identifier: BSD-3-Clause
+#include "view_servo/PointMatches.h"
+#include "view_servo/ros/view_answer.h"
+
+#include <gtest/gtest.h>
+
+#include <stdexcept>
+#include <string>
+
+namespace view_servo
+{
+namespace
+{
+PointMatches about(const std::string& view, const std::string& goal, const std::string& refusal = "")
+{
+  PointMatches message;
+  message.view = view;
+  message.goal = goal;
+  message.refused = refusal.empty() ? 0 : 1;
+  message.reason = refusal;
+  return message;
+}
+
+class ViewAnswerTest : public ::testing::Test
+{
+protected:
+  ViewAnswer answer_{ "matches", "/point_matches" };
+};
+
+TEST_F(ViewAnswerTest, IsNothingWhenNothingIsWanted)
+{
+  EXPECT_FALSE(answer_.add(about("dock", "")));
+  EXPECT_FALSE(answer_.came());
+}
+
+TEST_F(ViewAnswerTest, ComesOfTheGoalOrOfSomebodyWhoChoseTheSameView)
+{
+  for (const std::string goal : { "goal 2", "" })
+  {
+    answer_.want("dock", "goal 2");
+    EXPECT_NE(answer_.missing().find("no matches of view 'dock' have come on '/point_matches'"), std::string::npos);
+    EXPECT_TRUE(answer_.add(about("dock", goal)));
+    EXPECT_TRUE(answer_.came());
+    EXPECT_EQ(answer_.missing(), "");
+  }
+}
+
+TEST_F(ViewAnswerTest, IsNotThatOfAFormerGoal)
+{
+  answer_.want("dock", "goal 2");
+  EXPECT_FALSE(answer_.add(about("dock", "goal 1")));
+  EXPECT_FALSE(answer_.add(about("dock", "goal 1", "it is gone")));
+  EXPECT_FALSE(answer_.came());
+  EXPECT_EQ(answer_.refusal(), "");
+  EXPECT_EQ(answer_.otherView(), "");
+}
+
+TEST_F(ViewAnswerTest, NamesAnotherView)
+{
+  answer_.want("dock", "goal 2");
+  EXPECT_FALSE(answer_.add(about("door", "")));
+  EXPECT_NE(answer_.missing().find("are of view 'door', not of 'dock'"), std::string::npos);
+  EXPECT_TRUE(answer_.add(about("dock", "")));
+  EXPECT_EQ(answer_.otherView(), "");
+}
+
+TEST_F(ViewAnswerTest, RefusesForAReason)
+{
+  answer_.want("dock", "goal 2");
+  EXPECT_FALSE(answer_.add(about("dock", "goal 2", "there is no such view")));
+  EXPECT_NE(answer_.refusal().find("there is no such view"), std::string::npos);
+  EXPECT_THROW(missingAnswer({ &answer_ }), std::runtime_error);
+  EXPECT_TRUE(answer_.add(about("dock", "goal 2")));  // it was stored meanwhile
+  EXPECT_EQ(missingAnswer({ &answer_ }), "");
+}
+
+TEST_F(ViewAnswerTest, OneOfSeveralIsEnough)
+{
+  ViewAnswer other("matches", "/line_matches");
+  answer_.want("dock", "goal");
+  other.want("dock", "goal");
+  answer_.add(about("dock", "goal", "too small"));
+  EXPECT_NE(missingAnswer({ &answer_, &other }), "");
+  other.add(about("dock", "goal"));
+  EXPECT_EQ(missingAnswer({ &answer_, &other }), "");
+}
+
+}  // namespace
+}  // namespace view_servo
