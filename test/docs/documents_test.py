@@ -355,10 +355,13 @@ class Documented(unittest.TestCase):
                 with self.subTest(where=command.place, command=command.text):
                     count += 1
                     begin = time.monotonic()
+                    outcome = "FAILED"
                     try:
                         self.try_command(command.text)
+                        outcome = "passed"
                     finally:
-                        print("%5.1f s  %s  %s" % (time.monotonic() - begin, command.place, command.text), flush=True)
+                        print("%s %5.1f s  %s  %s" % (outcome, time.monotonic() - begin, command.place, command.text),
+                              flush=True)
         self.assertGreater(count, 30)
 
     # ----------------------------------------------------------------------------------------------------------- names
