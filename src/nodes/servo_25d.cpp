@@ -161,7 +161,7 @@ public:
     task_->start = Clock::now();
     camera_frame_ = info_->header.frame_id;
     joints_.rest();
-    joint_states_.setNeeded(joint_states_.age() <= params_.joint_timeout);
+    joint_states_.setNeeded(joint_states_.fresh());
     onCameraInfo(info_);  // it may have changed since
   }
 
@@ -196,6 +196,7 @@ public:
 
   Velocity wanted(double time)
   {
+    ++task_->iterations;
     Velocity twist = task_->servo.command(time);
     task_->moves = !twist.isZero();
     if (!task_->moves)
@@ -210,7 +211,6 @@ public:
   void sent(double time, const Velocity& twist)
   {
     task_->servo.sent(time, twist);
-    ++task_->iterations;
   }
 
   void stands(double time, const std::string& why)
@@ -274,7 +274,7 @@ public:
   void diagnose(diagnostic_updater::DiagnosticStatusWrapper& status) const
   {
     status.add("View", task_ ? task_->view : answer_.view());
-    status.add("Joint limits are watched", !joints_.empty() && joint_states_.age() <= params_.joint_timeout);
+    status.add("Joint limits are watched", joint_states_.fresh());
   }
 
 private:

@@ -296,6 +296,23 @@ TEST_F(ArmServoTest, ForgetsAJointThatIsNotHeardOfAnyMore)
   })) << reason();
 }
 
+TEST_F(ArmServoTest, DoesWithoutJointStatesThatNeverCome)
+{
+  robot_.joints_come = false;
+  const Clock::time_point moment = Clock::now();
+  const auto drives_on = [&] {
+    return commands_.lastMotionAfter(moment) > 4.0;
+  };
+  // What former tests published is forgotten first.
+  EXPECT_TRUE(waitUntil(drives_on, [this] {
+    if (!commands_.any() || client_.getState().isDone() || reason().find("no joint states") != std::string::npos)
+    {
+      send("goal");
+      waitUntil([this] { return commands_.moving(); });
+    }
+  })) << reason();
+}
+
 TEST_F(ArmServoTest, StopsWhenJointStatesStopAndGoesOnWithThem)
 {
   drive();

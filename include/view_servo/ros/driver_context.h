@@ -37,6 +37,12 @@ public:
   {
     watch_.feed();
     problem_.clear();
+    came_ = true;
+  }
+  /** Whether something that can be used has come, and not too long ago. */
+  bool fresh() const
+  {
+    return came_ && !watch_.stale();
   }
   /** Something has come that cannot. @param problem why, one line. */
   void reject(const std::string& problem)
@@ -98,6 +104,7 @@ private:
   std::string problem_;
   std::string jump_;
   ros::Time last_stamp_;
+  bool came_ = false;
   bool needed_ = true;
 };
 

@@ -278,12 +278,12 @@ private:
   {
     limiter_.stop();
     missing_since_.reset();
+    goal_->stage = Stage::RUNNING;
+    const std::string fault = guarded("the goal's begin", [&] { driver_.begin(std::move(task)); });
     for (const std::unique_ptr<DriverInput>& input : inputs_)
     {
       input->restart();
     }
-    goal_->stage = Stage::RUNNING;
-    const std::string fault = guarded("the goal's begin", [&] { driver_.begin(std::move(task)); });
     if (!fault.empty())
     {
       abort(fault);
