@@ -177,6 +177,23 @@ class AwkwardOrder(unittest.TestCase):
         self.start_all_before_the_camera("arm_servo.launch", ["sim:=false"],
                                          ["/view_store/save", "/servo_25d/enable", "/homography_tracker/start"])
 
+    def test_paused_clock(self):
+        """A request for an image that does not come is answered although ROS' time stands still."""
+        rospy.set_param("/use_sim_time", True)
+        self.addCleanup(rospy.delete_param, "/use_sim_time")
+        nodes = self.load("matching.launch")
+        self.start(next(node for node in nodes if node.name == "view_store"))
+        self.assert_services_answer("/view_store/save")
+        answers = []
+        request = SaveViewRequest(name="never")
+        caller = threading.Thread(target=lambda: answers.append(rospy.ServiceProxy("view_store/save", SaveView)(request)),
+                                  daemon=True)
+        caller.start()
+        caller.join(PATIENCE)
+        self.assertTrue(answers, "there is no answer")
+        self.assertFalse(answers[0].success)
+        self.assertIn("/camera/image_raw", answers[0].message)
+
     def run_simulation(self, file, robot, run):
         """A whole run in which the simulated robot comes last, and late."""
         result = os.path.join(self.directory, run + ".result")
