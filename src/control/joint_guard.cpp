@@ -16,7 +16,7 @@ JointGuard::JointGuard(std::map<std::string, JointLimits> limits, double margin,
 }
 
 std::string JointGuard::add(double time, const std::vector<std::string>& names, const std::vector<double>& positions,
-                     const std::vector<double>& velocities)
+                            const std::vector<double>& velocities)
 {
   constexpr double BEYOND = 0.1;  // of the range, where an arm can hardly be
   std::string unbelievable;
@@ -32,7 +32,8 @@ std::string JointGuard::add(double time, const std::vector<std::string>& names, 
     if (!(positions[i] >= lower - beyond && positions[i] <= upper + beyond))
     {
       char text[100];
-      std::snprintf(text, sizeof(text), "' is said to be at %.3g, its limits are %.3g and %.3g", positions[i], lower, upper);
+      std::snprintf(text, sizeof(text), "' is said to be at %.3g, its limits are %.3g and %.3g", positions[i], lower,
+                    upper);
       unbelievable = "joint '" + names[i] + text;
       continue;
     }

@@ -54,10 +54,22 @@ TEST(PlaneView, IsWithoutWhatIsNotKnownYet)
 TEST(PlaneView, RefusesNumbersOutsideTheirRange)
 {
   const std::vector<std::pair<std::string, std::function<void(Homography&, double)>>> fields = {
-    { "rotation", [](Homography& m, double x) { m.rotation.w = x; } },
-    { "t / d", [](Homography& m, double x) { m.translation_over_distance.y = x; } },
-    { "normal", [](Homography& m, double x) { m.normal.x = x; } },
-    { "distance", [](Homography& m, double x) { m.distance = x; } },
+    { "rotation",
+      [](Homography& m, double x) {
+        m.rotation.w = x;
+      } },
+    { "t / d",
+      [](Homography& m, double x) {
+        m.translation_over_distance.y = x;
+      } },
+    { "normal",
+      [](Homography& m, double x) {
+        m.normal.x = x;
+      } },
+    { "distance",
+      [](Homography& m, double x) {
+        m.distance = x;
+      } },
   };
   for (const auto& [name, set] : fields)
   {

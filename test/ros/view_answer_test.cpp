@@ -1,7 +1,7 @@
 // Copyright (c) 2026, the view_servo authors
 // SPDX-License-Identifier: BSD-3-Clause
-#include "view_servo/PointMatches.h"
 #include "view_servo/ros/view_answer.h"
+#include "view_servo/PointMatches.h"
 
 #include <gtest/gtest.h>
 

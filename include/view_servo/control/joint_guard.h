@@ -34,7 +34,7 @@ public:
    * @return which position is not believed, as it is no number or lies far beyond the limits; empty: all are.
    */
   std::string add(double time, const std::vector<std::string>& names, const std::vector<double>& positions,
-           const std::vector<double>& velocities);
+                  const std::vector<double>& velocities);
 
   /**
    * Called while the arm is to move: the joint that goes further towards a limit that it is at, or stands there for longer
