@@ -200,6 +200,13 @@ class Documented(unittest.TestCase):
                 text = file.read()
             for target in targets:
                 self.assertTrue(target == "tests" or "add_custom_target(%s" % target in text, target)
+        elif words[:2] == ["scripts/test", "--sanitize"]:
+            # To run it would take longer than all other tests: the sanitizer is one that its help names, and the tests exist.
+            self.assertIn(" ".join(words[:3]) + " ", self.run_here("%s --help" % script))
+            tests = " ".join("_ctest_view_servo_rostest_test_" + os.path.relpath(path, os.path.join(ROOT, "test")).replace("/", "_")
+                             for path in glob.glob(os.path.join(ROOT, "test", "rostest", "*.test")))
+            for expression in words[3:]:
+                self.assertRegex(tests, expression)
         elif " ".join(words) not in NOT_RUN:
             self.assertEqual(words, ["scripts/check_rooms"])
             self.run_here(script)
@@ -417,7 +424,7 @@ class Documented(unittest.TestCase):
         sources = ""
         for path in glob.glob(os.path.join(ROOT, "include", "**", "*.h"), recursive=True) + \
                 glob.glob(os.path.join(ROOT, "src", "**", "*.*"), recursive=True) + \
-                [os.path.join(ROOT, name) for name in ("CMakeLists.txt", "package.xml", "scripts/plot_run")]:
+                [os.path.join(ROOT, name) for name in ("CMakeLists.txt", "package.xml", "scripts/plot_run", "test/rostest/node_test.h")]:
             with open(path) as file:
                 sources += file.read()
         words = set(re.findall(r"\w+", sources.replace("${PROJECT_NAME}", PACKAGE)))
@@ -426,7 +433,9 @@ class Documented(unittest.TestCase):
             if text in KNOWN_NAMES or self.is_command(text) or "/" + text.lstrip("/") in known:
                 return True
             if text.startswith("~"):
-                return text[1:] in parameters | last_parts
+                group, _, name = text[1:].rpartition("/")
+                grouped = name in parameters and '(reader, "%s")' % group in sources
+                return text[1:] in parameters | last_parts or grouped or '(reader, "%s")' % text[1:] in sources
             if ":=" in text:
                 return all(part.split(":=")[0] in arguments for part in text.split(" "))
             match = re.match(r"(\w+):( |$)", text)
@@ -435,6 +444,8 @@ class Documented(unittest.TestCase):
             match = re.fullmatch(r"#include <view_servo/(\w+)\.h>", text)
             if match:
                 return self.type_exists(match.group(1))
+            if os.path.dirname(text) == "build":  # made by the build
+                return os.path.basename(text) in sources
             if os.path.exists(os.path.join(ROOT, text)) or glob.glob(os.path.join(ROOT, "*", text)) or \
                     glob.glob(os.path.join(ROOT, "*", "*", text + ".*")):
                 return True
