@@ -4,6 +4,8 @@
 
 #include "view_servo/ros/conversions.h"
 
+#include <cstddef>
+
 namespace view_servo
 {
 HomingWorker::HomingWorker(std::string image_topic, std::function<void(const HomingOutcome&)> on_outcome,
@@ -30,7 +32,15 @@ void HomingWorker::addOdometry(double stamp, const PlanarPose& base_in_odom)
 
 void HomingWorker::addMatches(double stamp, const HeadingEvidence& evidence)
 {
-  worker_.put([&](Inbox& inbox) { inbox.matches.emplace_back(stamp, evidence); });
+  // One of points and one of lines: where work takes longer than the time between two, a queue would grow without end.
+  constexpr std::size_t MOST = 2;
+  worker_.put([&](Inbox& inbox) {
+    if (inbox.matches.size() >= MOST)
+    {
+      inbox.matches.erase(inbox.matches.begin());
+    }
+    inbox.matches.emplace_back(stamp, evidence);
+  });
 }
 
 void HomingWorker::addFrame(const CameraFrame& frame)

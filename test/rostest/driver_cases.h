@@ -51,7 +51,7 @@ TYPED_TEST_P(DriverCases, IsDisabledWhileItPrepares)
 {
   this->prepareInVain();
   this->expectToEnd([this] { this->enable(false); }, SimpleClientGoalState::ABORTED, "disabled");
-  EXPECT_EQ(this->status_.last()->state, ServoStatus::DISABLED);
+  EXPECT_TRUE(waitUntil([this] { return this->status_.last()->state == ServoStatus::DISABLED; }));
 }
 
 TYPED_TEST_P(DriverCases, IsReplacedWhileItPrepares)
@@ -113,7 +113,7 @@ TYPED_TEST_P(DriverCases, StopsWhenDisabled)
 {
   this->drive();
   this->expectToEnd([this] { this->enable(false); }, SimpleClientGoalState::ABORTED, "disabled");
-  EXPECT_EQ(this->status_.last()->state, ServoStatus::DISABLED);
+  EXPECT_TRUE(waitUntil([this] { return this->status_.last()->state == ServoStatus::DISABLED; }));
 }
 
 TYPED_TEST_P(DriverCases, StopsWhenTheGoalIsCancelled)

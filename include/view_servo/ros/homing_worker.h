@@ -40,7 +40,7 @@ struct HomingOutcome
 
 /**
  * Works on images, matches and odometry of one task at a time in a thread of its own, because an image takes longer than a cycle of
- * control. Of the images that come meanwhile it takes the newest.
+ * control. Of the images that come meanwhile it takes the newest, of matches the newest two.
  */
 class HomingWorker
 {
