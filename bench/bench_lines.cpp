@@ -14,9 +14,9 @@
  * - time: medians of everything from two images to matches, and of one live image against a stored one, for images of
  *   640x480 with about 300 segments, as ratios to LSD with LBD.
  */
-#include "line_ground_truth.h"
+#include "experiments/line_ground_truth.h"
 #include "view_servo/geometry/fundamental.h"
-#include "view_servo/views/image_io.h"
+#include "view_servo/images/image_io.h"
 #include "view_servo/views/line_view_matcher.h"
 #include "view_servo/views/matcher_parameters.h"
 

@@ -13,7 +13,7 @@
  * - time: medians of a whole match, and of one against a stored reference, as ratios to SIFT's.
  */
 #include "view_servo/views/matcher_parameters.h"
-#include "view_servo/views/view_matcher.h"
+#include "view_servo/views/point_view_matcher.h"
 
 #include <Eigen/Geometry>
 #include <Eigen/LU>
@@ -113,12 +113,12 @@ Answer fromMatch(const ViewMatch& match)
   return answer;
 }
 
-Answer runOurs(const ViewMatcherParams& params, const Problem& problem)
+Answer runOurs(const PointViewMatcherParams& params, const Problem& problem)
 {
   const auto start = std::chrono::steady_clock::now();
   const PreparedImage reference(problem.reference, cv::Rect(), params.points);
   const PreparedImage current(problem.current, cv::Rect(), params.points);
-  Answer answer = fromMatch(ViewMatcher(params).match(reference, current, GeometryModel::HOMOGRAPHY));
+  Answer answer = fromMatch(PointViewMatcher(params).match(reference, current, GeometryModel::HOMOGRAPHY));
   answer.ms = millisecondsSince(start);
   return answer;
 }
@@ -210,7 +210,7 @@ std::optional<Problem> loadProblem(const std::filesystem::path& sequence, int nu
   return problem;
 }
 
-int oxford(const ViewMatcherParams& params)
+int oxford(const PointViewMatcherParams& params)
 {
   const char* data = std::getenv("VIEW_SERVO_DATA");
   if (data == nullptr)
@@ -336,13 +336,13 @@ Problem tiltedPlane(const std::string& name, const cv::Mat& texture, double tilt
   return problem;
 }
 
-int tilt(const ViewMatcherParams& params)
+int tilt(const PointViewMatcherParams& params)
 {
-  ViewMatcherParams cyclic = params;
+  PointViewMatcherParams cyclic = params;
   cyclic.guided = false;
   cyclic.first_share = 1.0;  // so that both look at the same profiles
   cyclic.points.cyclic_order = true;
-  ViewMatcherParams votes = cyclic;
+  PointViewMatcherParams votes = cyclic;
   votes.points.cyclic_order = false;
   const std::vector<std::pair<std::string, std::function<Answer(const Problem&)>>> pipelines = {
     { "view_servo",
@@ -426,7 +426,7 @@ double median(std::vector<double> values)
   return values[values.size() / 2];
 }
 
-int timing(const ViewMatcherParams& params, int runs)
+int timing(const PointViewMatcherParams& params, int runs)
 {
   const cv::Mat texture = loadTexture("graf1.png");
   if (texture.empty())
@@ -437,7 +437,7 @@ int timing(const ViewMatcherParams& params, int runs)
   const Problem problem = tiltedPlane("graf1.png", texture, 45.0, 0, 1);
   std::printf("%s tilted by 45 degrees, 768x576, %d threads, medians of %d runs in ms\n", problem.name.c_str(),
               cv::getNumThreads(), runs);
-  const ViewMatcher matcher(params);
+  const PointViewMatcher matcher(params);
   const PreparedImage stored(problem.reference, cv::Rect(), params.points);
   std::vector<double> fresh_ms;
   std::vector<double> stored_ms;
@@ -478,7 +478,7 @@ int timing(const ViewMatcherParams& params, int runs)
 }
 
 /** Peak memory of the process after one match [MB]; a mode of its own, as the peers need more. */
-int memory(const ViewMatcherParams& params)
+int memory(const PointViewMatcherParams& params)
 {
   const cv::Mat texture = loadTexture("graf1.png");
   if (texture.empty())
@@ -501,7 +501,7 @@ int memory(const ViewMatcherParams& params)
 int main(int argc, char** argv)
 {
   const std::string usage = "usage: bench_points oxford|tilt|time|memory [--runs N] [--set name=value ...]\n";
-  ViewMatcherParams params;
+  PointViewMatcherParams params;
   int runs = 15;
   try
   {

@@ -23,8 +23,8 @@
  */
 #include "view_servo/geometry/homography.h"
 #include "view_servo/robust/random.h"
-#include "view_servo/tracking/homography_tracker.h"
-#include "view_servo/views/image_io.h"
+#include "view_servo/tracking/homography_aligner.h"
+#include "view_servo/images/image_io.h"
 
 #include "sim/textures.h"
 
@@ -179,7 +179,7 @@ private:
 /** @param region of the reference that shows the plane [px]; empty = everywhere, here and below. */
 Tracker ours(const cv::Mat& reference, const cv::Rect& region = cv::Rect())
 {
-  auto tracker = std::make_shared<HomographyTracker>(reference, region, HomographyTrackerParams());
+  auto tracker = std::make_shared<HomographyAligner>(reference, region, HomographyAlignerParams());
   return [tracker](const cv::Mat& image, const Eigen::Matrix3d& predicted) {
     const TrackedHomography found = tracker->track(image, predicted);
     return found.found ? std::optional<Eigen::Matrix3d>(found.h) : std::nullopt;

@@ -2,7 +2,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "view_servo/control/homing.h"
 
-#include "view_servo/geometry/faults.h"
+#include "view_servo/parameters/faults.h"
 #include "view_servo/geometry/fundamental.h"
 
 #include <algorithm>

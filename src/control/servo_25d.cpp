@@ -2,7 +2,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "view_servo/control/servo_25d.h"
 
-#include "view_servo/geometry/faults.h"
+#include "view_servo/parameters/faults.h"
 
 #include <visp3/core/vpColVector.h>
 #include <visp3/core/vpThetaUVector.h>

@@ -3,9 +3,9 @@
 #include "arm_experiments.h"
 
 #include "input_file.h"
-#include "package_folder.h"
+#include "tools/package_folder.h"
 #include "parallel.h"
-#include "sim/arm_trial.h"
+#include "trials/arm_trial.h"
 #include "sim/world.h"
 #include "view_servo/robust/random.h"
 

@@ -6,7 +6,7 @@
 #include "point_pairs.h"
 #include "sim/textures.h"
 #include "view_servo/views/prepared_image.h"
-#include "view_servo/views/view_matcher.h"
+#include "view_servo/views/point_view_matcher.h"
 
 #include <opencv2/core.hpp>
 #include <opencv2/imgproc.hpp>
@@ -91,7 +91,7 @@ std::vector<Picture> oxfordPictures(const fs::path& data)
 struct OrderSetting
 {
   std::string name;
-  ViewMatcherParams params;
+  PointViewMatcherParams params;
 };
 
 /** The defaults, and the thesis' values (7.4; N_f as in 6.2.1), which take ten times as long. */
@@ -122,9 +122,9 @@ void compareOrders(const PointPair& pair, const OrderSetting& setting, const std
   std::cerr << series << ' ' << picture << ' ' << view << ", " << setting.name << ':';
   for (const bool cyclic : { false, true })
   {
-    ViewMatcherParams params = setting.params;
+    PointViewMatcherParams params = setting.params;
     params.points.cyclic_order = cyclic;
-    const ViewMatch match = ViewMatcher(params).match(reference, current, pair.model);
+    const ViewMatch match = PointViewMatcher(params).match(reference, current, pair.model);
     Correspondences candidates;
     Correspondences inliers;
     for (const MatchedPoint& point : match.matches)

@@ -3,16 +3,16 @@
 #include "homing_experiments.h"
 
 #include "input_file.h"
-#include "package_folder.h"
+#include "tools/package_folder.h"
 #include "parallel.h"
-#include "sim/homing_trial.h"
+#include "trials/homing_trial.h"
 #include "view_servo/control/heading_hypotheses.h"
 #include "view_servo/geometry/camera.h"
 #include "view_servo/robust/random.h"
-#include "view_servo/views/image_io.h"
+#include "view_servo/images/image_io.h"
 #include "view_servo/views/line_view_matcher.h"
 #include "view_servo/views/prepared_image.h"
-#include "view_servo/views/view_matcher.h"
+#include "view_servo/views/point_view_matcher.h"
 
 #include <Eigen/Geometry>
 #include <Eigen/LU>
@@ -230,7 +230,7 @@ void runDirectionsExperiment(const ExperimentContext& context, std::ostream& csv
   {
     walk.pairs.resize(std::min<std::size_t>(walk.pairs.size(), 6));
   }
-  const ViewMatcher points{ ViewMatcherParams() };
+  const PointViewMatcher points{ PointViewMatcherParams() };
   const LineViewMatcher lines{ LineMatcherParams() };
   FeatureParams features;
   features.points = points.params().points;

@@ -3,7 +3,7 @@
 #include "line_ground_truth.h"
 
 #include "input_file.h"
-#include "view_servo/views/image_io.h"
+#include "view_servo/images/image_io.h"
 #include "view_servo/views/segment_io.h"
 
 #include <algorithm>

@@ -5,7 +5,7 @@
 #include "input_file.h"
 #include "view_servo/geometry/fundamental.h"
 #include "view_servo/geometry/homography.h"
-#include "view_servo/views/image_io.h"
+#include "view_servo/images/image_io.h"
 
 #include <Eigen/Geometry>
 #include <opencv2/core.hpp>

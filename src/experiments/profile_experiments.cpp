@@ -6,7 +6,7 @@
 #include "view_servo/matching/point_matcher.h"
 #include "view_servo/robust/fundamental_estimator.h"
 #include "view_servo/robust/view_consistency.h"
-#include "view_servo/views/view_matcher.h"
+#include "view_servo/views/point_view_matcher.h"
 
 #include <opencv2/core.hpp>
 

@@ -2,7 +2,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "view_servo/matching/line_features.h"
 
-#include "view_servo/geometry/faults.h"
+#include "view_servo/parameters/faults.h"
 
 #include <opencv2/core.hpp>
 #include <opencv2/imgproc.hpp>

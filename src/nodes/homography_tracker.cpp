@@ -47,7 +47,7 @@ struct Params
   SessionStarterParams sessions;
   std::string view;
   double match_period = 0.3;
-  ViewMatcherParams matching;
+  PointViewMatcherParams matching;
 
   static Params read(const ros::NodeHandle& private_nh)
   {

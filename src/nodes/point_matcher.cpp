@@ -6,7 +6,7 @@
 #include "view_servo/ros/node_base.h"
 #include "view_servo/ros/parameters.h"
 #include "view_servo/ros/streaming_matcher.h"
-#include "view_servo/views/view_matcher.h"
+#include "view_servo/views/point_view_matcher.h"
 
 #include <functional>
 #include <limits>
@@ -34,7 +34,7 @@ GeometryModel toModel(const std::string& name)
 class PointMatching
 {
 public:
-  using Params = ViewMatcherParams;
+  using Params = PointViewMatcherParams;
   using Service = MatchPoints;
   using Message = PointMatches;
   struct Options
@@ -110,7 +110,7 @@ public:
   }
 
 private:
-  ViewMatcher matcher_;
+  PointViewMatcher matcher_;
 };
 
 }  // namespace

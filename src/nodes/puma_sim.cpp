@@ -1,7 +1,7 @@
 // Copyright (c) 2026, the view_servo authors
 // SPDX-License-Identifier: BSD-3-Clause
 #include "sim/puma.h"
-#include "simulation_node.h"
+#include "sim_ros/simulation_node.h"
 
 #include <geometry_msgs/TwistStamped.h>
 #include <ros/package.h>

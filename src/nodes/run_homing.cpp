@@ -1,6 +1,6 @@
 // Copyright (c) 2026, the view_servo authors
 // SPDX-License-Identifier: BSD-3-Clause
-#include "nodes/simulated_run.h"
+#include "sim_ros/simulated_run.h"
 #include "view_servo/HomeToViewAction.h"
 #include "view_servo/geometry/planar_motion.h"
 

@@ -1,6 +1,6 @@
 // Copyright (c) 2026, the view_servo authors
 // SPDX-License-Identifier: BSD-3-Clause
-#include "view_servo/views/parameter.h"
+#include "view_servo/parameters/parameter.h"
 
 #include <cmath>
 #include <locale>

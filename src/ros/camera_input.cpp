@@ -5,7 +5,7 @@
 #include "view_servo/ros/conversions.h"
 #include "view_servo/ros/node_base.h"
 #include "view_servo/ros/readiness.h"
-#include "view_servo/views/image_io.h"
+#include "view_servo/images/image_io.h"
 
 #include <ros/console.h>
 #include <ros/time.h>

@@ -2,7 +2,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "view_servo/ros/conversions.h"
 
-#include "view_servo/views/image_io.h"
+#include "view_servo/images/image_io.h"
 
 #include <cv_bridge/cv_bridge.h>
 #include <image_geometry/pinhole_camera_model.h>

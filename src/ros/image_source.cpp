@@ -3,7 +3,7 @@
 #include "view_servo/ros/image_source.h"
 
 #include "view_servo/ros/conversions.h"
-#include "view_servo/views/image_io.h"
+#include "view_servo/images/image_io.h"
 
 #include <cstdlib>
 #include <utility>

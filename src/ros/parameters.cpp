@@ -186,9 +186,9 @@ void ParameterReader::warnOfUnknown() const
   }
 }
 
-ViewMatcherParams readMatcherParams(ParameterReader& reader, const std::string& ns)
+PointViewMatcherParams readMatcherParams(ParameterReader& reader, const std::string& ns)
 {
-  return readTable<ViewMatcherParams>(reader, ns);
+  return readTable<PointViewMatcherParams>(reader, ns);
 }
 
 LineMatcherParams readLineMatcherParams(ParameterReader& reader)

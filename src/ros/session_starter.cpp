@@ -5,8 +5,8 @@
 #include "view_servo/ros/conversions.h"
 #include "view_servo/ros/image_source.h"
 #include "view_servo/ros/node_base.h"
-#include "view_servo/tracking/homography_tracker_parameters.h"
-#include "view_servo/views/image_io.h"
+#include "view_servo/tracking/plane_tracker_parameters.h"
+#include "view_servo/images/image_io.h"
 #include "view_servo/views/view_store.h"
 
 #include <ros/console.h>
@@ -24,7 +24,7 @@ SessionStarterParams SessionStarterParams::read(ParameterReader& reader)
   reader.read("odom_frame", params.odom_frame);
   reader.read("tf_patience", params.tf_patience);
   reader.require(params.tf_patience >= 0.0, "~tf_patience must not be negative [s]");
-  reader.read(homographyTrackerParameters(params.tracker));
+  reader.read(planeTrackerParameters(params.tracker));
   reader.addFaults(params.tracker.validate());
   return params;
 }

@@ -2,7 +2,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "sim/puma.h"
 
-#include "view_servo/geometry/faults.h"
+#include "view_servo/parameters/faults.h"
 
 #include <console_bridge/console.h>
 #include <urdf_model/model.h>

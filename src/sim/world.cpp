@@ -3,7 +3,7 @@
 #include "sim/world.h"
 
 #include "sim/textures.h"
-#include "view_servo/views/image_io.h"
+#include "view_servo/images/image_io.h"
 
 #include <yaml-cpp/yaml.h>
 #include <Eigen/LU>

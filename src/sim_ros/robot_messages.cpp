@@ -1,6 +1,6 @@
 // Copyright (c) 2026, the view_servo authors
 // SPDX-License-Identifier: BSD-3-Clause
-#include "nodes/robot_messages.h"
+#include "sim_ros/robot_messages.h"
 
 #include "view_servo/ros/conversions.h"
 

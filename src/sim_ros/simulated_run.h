@@ -2,7 +2,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-#include "nodes/robot_messages.h"
+#include "sim_ros/robot_messages.h"
 #include "sim/world.h"
 #include "view_servo/SaveView.h"
 #include "view_servo/ServoStatus.h"

@@ -4,13 +4,13 @@
 #include "view_servo/features/line_segments.h"
 #include "view_servo/geometry/correspondence.h"
 #include "view_servo/matching/line_features.h"
-#include "view_servo/views/image_io.h"
+#include "view_servo/images/image_io.h"
 #include "view_servo/views/line_view_matcher.h"
 #include "view_servo/views/matcher_parameters.h"
 #include "view_servo/views/overlay.h"
 #include "view_servo/views/prepared_image.h"
 #include "view_servo/views/segment_io.h"
-#include "view_servo/views/view_matcher.h"
+#include "view_servo/views/point_view_matcher.h"
 
 #include <CLI/CLI.hpp>
 #include <Eigen/Geometry>
@@ -312,7 +312,7 @@ private:
 
 ExitStatus matchPoints(const Options& options)
 {
-  const auto matcher = makeMatcher<ViewMatcher, ViewMatcherParams>(options.settings);
+  const auto matcher = makeMatcher<PointViewMatcher, PointViewMatcherParams>(options.settings);
   const Report report(options);
   const PreparedImage reference(readImage(options.reference), cv::Rect(), matcher.params().points);
   const PreparedImage current(readImage(options.current), cv::Rect(), matcher.params().points);
@@ -434,7 +434,7 @@ int main(int argc, char** argv)
     app.parse(argc, argv);
     if (list_parameters)
     {
-      listParameters<ViewMatcherParams>("points");
+      listParameters<PointViewMatcherParams>("points");
       listParameters<LineMatcherParams>("lines");
       return FOUND;
     }

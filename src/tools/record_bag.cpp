@@ -1,14 +1,14 @@
 // Copyright (c) 2026, the view_servo authors
 // SPDX-License-Identifier: BSD-3-Clause
 #include "command_line.h"
-#include "nodes/robot_messages.h"
-#include "package_folder.h"
+#include "sim_ros/robot_messages.h"
+#include "tools/package_folder.h"
 #include "sim/nomad.h"
 #include "sim/puma.h"
 #include "sim/renderer.h"
 #include "sim/world.h"
 #include "view_servo/ros/conversions.h"
-#include "view_servo/views/image_io.h"
+#include "view_servo/images/image_io.h"
 
 #include <rosbag/bag.h>
 #include <sensor_msgs/image_encodings.h>

@@ -1,10 +1,10 @@
 // Copyright (c) 2026, the view_servo authors
 // SPDX-License-Identifier: BSD-3-Clause
-#include "view_servo/tracking/homography_tracker.h"
+#include "view_servo/tracking/homography_aligner.h"
 
 #include "view_servo/features/corners.h"
 #include "view_servo/geometry/correspondence.h"
-#include "view_servo/geometry/faults.h"
+#include "view_servo/parameters/faults.h"
 #include "view_servo/geometry/homography.h"
 #include "view_servo/robust/homography_estimator.h"
 #include "view_servo/robust/ransac.h"
@@ -182,7 +182,7 @@ cv::Mat smoothed(const cv::Mat& image)
 }
 
 /** RANSAC; empty when too few agree. */
-std::optional<Eigen::Matrix3d> mostAgreed(const Correspondences& pairs, const HomographyTrackerParams& params)
+std::optional<Eigen::Matrix3d> mostAgreed(const Correspondences& pairs, const HomographyAlignerParams& params)
 {
   RansacParams ransac_params;
   ransac_params.inlier_threshold = params.max_residual;
@@ -295,7 +295,7 @@ private:
 
 }  // namespace
 
-std::vector<std::string> HomographyTrackerParams::validate() const
+std::vector<std::string> HomographyAlignerParams::validate() const
 {
   Faults faults;
   faults.require(max_points >= 12, "max_points must be at least 12");
@@ -308,8 +308,8 @@ std::vector<std::string> HomographyTrackerParams::validate() const
   return faults.list();
 }
 
-HomographyTracker::HomographyTracker(const cv::Mat& reference, const cv::Rect& region,
-                                     const HomographyTrackerParams& params)
+HomographyAligner::HomographyAligner(const cv::Mat& reference, const cv::Rect& region,
+                                     const HomographyAlignerParams& params)
   : params_(params)
 {
   constexpr int COARSE_RADIUS = 6;  // [px]
@@ -355,7 +355,7 @@ HomographyTracker::HomographyTracker(const cv::Mat& reference, const cv::Rect& r
   makeBlocks(smoothed(reference), used);
 }
 
-void HomographyTracker::makeBlocks(const cv::Mat& image, const cv::Rect& region)
+void HomographyAligner::makeBlocks(const cv::Mat& image, const cv::Rect& region)
 {
   centring_.middle = { region.x + 0.5 * (region.width - 1), region.y + 0.5 * (region.height - 1) };
   centring_.spread = 0.25 * (region.width + region.height);
@@ -403,7 +403,7 @@ void HomographyTracker::makeBlocks(const cv::Mat& image, const cv::Rect& region)
   }
 }
 
-Eigen::Matrix3d HomographyTracker::refine(const cv::Mat& current, const Eigen::Matrix3d& h) const
+Eigen::Matrix3d HomographyAligner::refine(const cv::Mat& current, const Eigen::Matrix3d& h) const
 {
   constexpr int ITERATIONS = 2;
   constexpr double WIDTH = 3.0;      // of the weights, in median deviations
@@ -516,7 +516,7 @@ Eigen::Matrix3d HomographyTracker::refine(const cv::Mat& current, const Eigen::M
   return refined;
 }
 
-HomographyTracker::Patch HomographyTracker::makePatch(const cv::Mat& image, const Eigen::Vector2d& at, int radius)
+HomographyAligner::Patch HomographyAligner::makePatch(const cv::Mat& image, const Eigen::Vector2d& at, int radius)
 {
   const double margin = radius + 2.0;
   Patch patch;
@@ -572,7 +572,7 @@ HomographyTracker::Patch HomographyTracker::makePatch(const cv::Mat& image, cons
   return patch;
 }
 
-bool HomographyTracker::align(const cv::Mat& current, const Patch& patch, const Eigen::Matrix3d& h, int iterations,
+bool HomographyAligner::align(const cv::Mat& current, const Patch& patch, const Eigen::Matrix3d& h, int iterations,
                               Alignment& alignment)
 {
   constexpr double CONVERGED = 0.005;  // step [px of the stored view]
@@ -618,7 +618,7 @@ bool HomographyTracker::align(const cv::Mat& current, const Patch& patch, const 
   }
 }
 
-std::vector<HomographyTracker::Alignment> HomographyTracker::alignAll(const cv::Mat& current, std::size_t level,
+std::vector<HomographyAligner::Alignment> HomographyAligner::alignAll(const cv::Mat& current, std::size_t level,
                                                                       const Eigen::Matrix3d& h, int iterations,
                                                                       int& looked_for) const
 {
@@ -644,7 +644,7 @@ std::vector<HomographyTracker::Alignment> HomographyTracker::alignAll(const cv::
   return alignments;
 }
 
-TrackedHomography HomographyTracker::track(const cv::Mat& current, const Eigen::Matrix3d& predicted) const
+TrackedHomography HomographyAligner::track(const cv::Mat& current, const Eigen::Matrix3d& predicted) const
 {
   if (current.empty() || current.type() != CV_8UC1)
   {
@@ -671,7 +671,7 @@ TrackedHomography HomographyTracker::track(const cv::Mat& current, const Eigen::
   return result;
 }
 
-TrackedHomography HomographyTracker::trackFrom(const std::vector<cv::Mat>& pyramid, const Eigen::Matrix3d& predicted,
+TrackedHomography HomographyAligner::trackFrom(const std::vector<cv::Mat>& pyramid, const Eigen::Matrix3d& predicted,
                                                int coarsest) const
 {
   constexpr int COARSE_ITERATIONS = 5;

@@ -86,7 +86,7 @@ PlaneFinder::Answer notFound(std::string reason)
 
 }  // namespace
 
-PlaneFinder::PlaneFinder(const ViewMatcherParams& params) : matcher_(params)
+PlaneFinder::PlaneFinder(const PointViewMatcherParams& params) : matcher_(params)
 {
 }
 

@@ -3,7 +3,7 @@
 #include "view_servo/tracking/plane_tracker.h"
 
 #include "view_servo/geometry/euclidean_homography.h"
-#include "view_servo/geometry/faults.h"
+#include "view_servo/parameters/faults.h"
 
 #include <Eigen/LU>
 

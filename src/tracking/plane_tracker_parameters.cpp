@@ -1,12 +1,12 @@
 // Copyright (c) 2026, the view_servo authors
 // SPDX-License-Identifier: BSD-3-Clause
-#include "view_servo/tracking/homography_tracker_parameters.h"
+#include "view_servo/tracking/plane_tracker_parameters.h"
 
 namespace view_servo
 {
-std::vector<Parameter> homographyTrackerParameters(PlaneTrackerParams& params)
+std::vector<Parameter> planeTrackerParameters(PlaneTrackerParams& params)
 {
-  HomographyTrackerParams& tracker = params.tracker;
+  HomographyAlignerParams& tracker = params.tracker;
   PlaneFilterParams& filter = params.filter;
   return {
     integer("max_points", tracker.max_points, "corners of the view that are looked for, >= 12"),

@@ -2,7 +2,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "view_servo/tracking/view_tracker.h"
 
-#include "view_servo/geometry/faults.h"
+#include "view_servo/parameters/faults.h"
 #include "view_servo/robust/planar_motion_estimator.h"
 #include "view_servo/robust/random.h"
 #include "view_servo/robust/ransac.h"

@@ -1,9 +1,9 @@
 // Copyright (c) 2026, the view_servo authors
 // SPDX-License-Identifier: BSD-3-Clause
-#include "sim/arm_trial.h"
+#include "trials/arm_trial.h"
 
 #include "sim/renderer.h"
-#include "sim/trial.h"
+#include "trials/trial.h"
 #include "view_servo/tracking/plane_finder.h"
 #include "view_servo/views/prepared_image.h"
 
@@ -41,7 +41,7 @@ struct Found
 struct ArmTrials::Parts
 {
   Parts(const World& world, std::uint64_t seed)
-    : finder(ViewMatcherParams()),
+    : finder(PointViewMatcherParams()),
       view(std::make_shared<const PreparedImage>(SimulatedCamera(world, {}, seed).capture(world.goal), world.region,
                                                  finder.features()))
   {

@@ -1,13 +1,13 @@
 // Copyright (c) 2026, the view_servo authors
 // SPDX-License-Identifier: BSD-3-Clause
-#include "sim/homing_trial.h"
+#include "trials/homing_trial.h"
 
 #include "sim/renderer.h"
-#include "sim/trial.h"
+#include "trials/trial.h"
 #include "sim/visibility.h"
 #include "view_servo/views/line_view_matcher.h"
 #include "view_servo/views/prepared_image.h"
-#include "view_servo/views/view_matcher.h"
+#include "view_servo/views/point_view_matcher.h"
 
 #include <opencv2/imgproc.hpp>
 
@@ -88,7 +88,7 @@ struct HomingTrials::Parts
   }
 
   SimulatedCamera camera;
-  ViewMatcher points{ ViewMatcherParams() };
+  PointViewMatcher points{ PointViewMatcherParams() };
   LineViewMatcher lines{ LineMatcherParams() };
   FeatureParams features;
   std::unique_ptr<PreparedImage> reference;

@@ -70,7 +70,7 @@ std::string nearestName(const std::vector<Parameter>& table, const std::string& 
   return nearest == table.end() ? std::string() : nearest->name;
 }
 
-std::vector<Parameter> matcherParameters(ViewMatcherParams& params)
+std::vector<Parameter> matcherParameters(PointViewMatcherParams& params)
 {
   PointMatcherParams& points = params.points;
   CornerParams& corners = points.corners;
@@ -194,7 +194,7 @@ std::vector<Parameter> matcherParameters(LineMatcherParams& params)
   return table;
 }
 
-void setParameter(ViewMatcherParams& params, const std::string& name, const std::string& value)
+void setParameter(PointViewMatcherParams& params, const std::string& name, const std::string& value)
 {
   setIn(matcherParameters(params), name, value);
 }

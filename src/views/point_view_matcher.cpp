@@ -1,9 +1,9 @@
 // Copyright (c) 2026, the view_servo authors
 // SPDX-License-Identifier: BSD-3-Clause
-#include "view_servo/views/view_matcher.h"
+#include "view_servo/views/point_view_matcher.h"
 
 #include "stage_clock.h"
-#include "view_servo/geometry/faults.h"
+#include "view_servo/parameters/faults.h"
 #include "view_servo/geometry/fundamental.h"
 #include "view_servo/geometry/homography.h"
 #include "view_servo/robust/fundamental_estimator.h"
@@ -51,7 +51,7 @@ struct Trial
 // of the profiles may find a better one.
 constexpr double BEYOND_DOUBT = 10.0;  // times the significance asked for
 
-std::vector<Trial> trials(const ViewMatcherParams& params)
+std::vector<Trial> trials(const PointViewMatcherParams& params)
 {
   const double all = params.points.search.share;
   std::vector<Trial> result;
@@ -80,7 +80,7 @@ struct Fit
 class Geometry
 {
 public:
-  Geometry(GeometryModel model, const ViewMatcherParams& params, double threshold)
+  Geometry(GeometryModel model, const PointViewMatcherParams& params, double threshold)
     : model_(model), params_(params), threshold_(threshold)
   {
   }
@@ -185,7 +185,7 @@ private:
   }
 
   GeometryModel model_;
-  const ViewMatcherParams& params_;
+  const PointViewMatcherParams& params_;
   double threshold_;
 };
 
@@ -265,7 +265,7 @@ class Attempt
 {
 public:
   Attempt(const PreparedImage& reference, const PreparedImage& current, const Trial& trial, const Geometry& geometry,
-          const ViewMatcherParams& params)
+          const PointViewMatcherParams& params)
     : reference_(reference),
       current_(current),
       levels_(trial.levels),
@@ -474,7 +474,7 @@ private:
   const LevelPair levels_;
   const double min_significance_;
   const Geometry& geometry_;
-  ViewMatcherParams params_;
+  PointViewMatcherParams params_;
   const PointFeatures& from_;
   const PointFeatures& to_;
   AssociationMatrix association_;
@@ -485,7 +485,7 @@ private:
 
 }  // namespace
 
-std::vector<std::string> ViewMatcherParams::validate() const
+std::vector<std::string> PointViewMatcherParams::validate() const
 {
   std::vector<std::string> faults;
   for (const std::vector<std::string>& more :
@@ -508,12 +508,12 @@ std::vector<std::string> ViewMatcherParams::validate() const
   return faults;
 }
 
-ViewMatcher::ViewMatcher(const ViewMatcherParams& params) : params_(params)
+PointViewMatcher::PointViewMatcher(const PointViewMatcherParams& params) : params_(params)
 {
   requireNoFaults("matching parameters", params.validate());
 }
 
-ViewMatch ViewMatcher::match(const PreparedImage& reference, const PreparedImage& current, GeometryModel model,
+ViewMatch PointViewMatcher::match(const PreparedImage& reference, const PreparedImage& current, GeometryModel model,
                              double inlier_threshold, const std::function<bool()>& given_up) const
 {
   if (!(inlier_threshold >= 0.0) || std::isinf(inlier_threshold))

@@ -2,7 +2,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "view_servo/views/view_store.h"
 
-#include "view_servo/views/image_io.h"
+#include "view_servo/images/image_io.h"
 
 #include <yaml-cpp/yaml.h>
 #include <opencv2/imgcodecs.hpp>

@@ -1,6 +1,6 @@
 // Copyright (c) 2026, the view_servo authors
 // SPDX-License-Identifier: BSD-3-Clause
-#include "tools/arm_geometry_experiment.h"
+#include "experiments/arm_geometry_experiment.h"
 
 #include "support/csv_table.h"
 #include "support/temporary_directory.h"

@@ -1,11 +1,11 @@
 // Copyright (c) 2026, the view_servo authors
 // SPDX-License-Identifier: BSD-3-Clause
-#include "tools/hypothesis_experiments.h"
+#include "experiments/hypothesis_experiments.h"
 
 #include "sim/textures.h"
 #include "support/csv_table.h"
 #include "support/temporary_directory.h"
-#include "tools/point_pairs.h"
+#include "experiments/point_pairs.h"
 
 #include <gtest/gtest.h>
 #include <opencv2/imgcodecs.hpp>

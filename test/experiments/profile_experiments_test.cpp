@@ -1,12 +1,12 @@
 // Copyright (c) 2026, the view_servo authors
 // SPDX-License-Identifier: BSD-3-Clause
-#include "tools/profile_experiments.h"
+#include "experiments/profile_experiments.h"
 
 #include "sim/textures.h"
 #include "support/csv_table.h"
 #include "support/temporary_directory.h"
-#include "tools/cyclic_order_experiment.h"
-#include "tools/point_pairs.h"
+#include "experiments/cyclic_order_experiment.h"
+#include "experiments/point_pairs.h"
 #include "view_servo/geometry/homography.h"
 
 #include <gtest/gtest.h>

@@ -7,7 +7,8 @@
 #include "view_servo/geometry/homography.h"
 #include "view_servo/views/line_view_matcher.h"
 #include "view_servo/views/prepared_image.h"
-#include "view_servo/views/view_matcher.h"
+#include "view_servo/views/point_view_matcher.h"
+#include "test_paths.h"
 
 #include <gtest/gtest.h>
 
@@ -57,7 +58,7 @@ std::vector<Frame> record(const std::string& world, const std::string& trajector
   const std::string file = directory.path() / "world.yaml";
   const std::string bag = directory.path() / "run.bag";
   std::ofstream(file) << world;
-  const std::string command = "'" RECORD_BAG_BINARY "' '" + file + "' '" + trajectory + "' '" + bag +
+  const std::string command = "'" RECORD_BAG_PATH "' '" + file + "' '" + trajectory + "' '" + bag +
                               "' --rate 1 --urdf '" PACKAGE_DIR "/urdf/puma560.urdf'";
   EXPECT_EQ(std::system(command.c_str()), 0) << command;
   return framesOf(bag);
@@ -123,7 +124,7 @@ bool isHonest(const ViewMatch& match)
   return matched;
 }
 
-PreparedImage prepared(const Frame& frame, const ViewMatcher& matcher)
+PreparedImage prepared(const Frame& frame, const PointViewMatcher& matcher)
 {
   return PreparedImage(frame.image, cv::Rect(), matcher.params().points);
 }
@@ -133,7 +134,7 @@ PreparedImage prepared(const Frame& frame, const LineViewMatcher& matcher)
   return PreparedImage(frame.image, cv::Rect(), { matcher.params().segments, matcher.params().features });
 }
 
-ViewMatch match(const ViewMatcher& matcher, const PreparedImage& reference, const PreparedImage& current,
+ViewMatch match(const PointViewMatcher& matcher, const PreparedImage& reference, const PreparedImage& current,
                 GeometryModel model)
 {
   return matcher.match(reference, current, model);
@@ -215,7 +216,7 @@ std::vector<Frame> elsewhere(const std::vector<Frame>& frames, const Frame& refe
   return others;
 }
 
-const ViewMatcher POINTS{ ViewMatcherParams() };
+const PointViewMatcher POINTS{ PointViewMatcherParams() };
 const LineViewMatcher LINES{ LineMatcherParams() };
 
 TEST(Bag, HomographiesOfPointsAgreeWithTheTruth)

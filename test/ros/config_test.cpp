@@ -2,8 +2,9 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "view_servo/control/homing_parameters.h"
 #include "view_servo/control/servo_parameters.h"
-#include "view_servo/tracking/homography_tracker_parameters.h"
+#include "view_servo/tracking/plane_tracker_parameters.h"
 #include "view_servo/views/matcher_parameters.h"
+#include "test_paths.h"
 
 #include <gtest/gtest.h>
 #include <yaml-cpp/yaml.h>
@@ -20,7 +21,7 @@ void expectEveryParameterAtItsDefault(const std::string& file, const std::vector
                                       const std::vector<std::string>& of_the_node)
 {
   SCOPED_TRACE(file);
-  const YAML::Node config = YAML::LoadFile(CONFIG_DIR "/" + file);
+  const YAML::Node config = YAML::LoadFile(PACKAGE_DIR "/config/" + file);
   EXPECT_EQ(config.size(), of_the_node.size() + table.size());
   for (const std::string& name : of_the_node)
   {
@@ -41,7 +42,7 @@ const std::vector<std::string> OF_MATCHERS = {
 
 TEST(Config, PointMatcherHasEveryParameterAtItsDefault)
 {
-  ViewMatcherParams params;
+  PointViewMatcherParams params;
   expectEveryParameterAtItsDefault("point_matcher.yaml", matcherParameters(params), OF_MATCHERS);
 }
 
@@ -64,7 +65,7 @@ TEST(Config, HomingHasEveryParameterAtItsDefault)
 TEST(Config, HomographyTrackerHasEveryParameterAtItsDefault)
 {
   PlaneTrackerParams params;
-  expectEveryParameterAtItsDefault("homography_tracker.yaml", homographyTrackerParameters(params),
+  expectEveryParameterAtItsDefault("homography_tracker.yaml", planeTrackerParameters(params),
                                    { "view", "views_dir", "odom_frame", "tf_patience", "match_period",
                                      "image_transport", "queue_size", "max_image_age" });
 }

@@ -14,6 +14,7 @@
 #include "view_servo/control/servo_25d.h"
 #include "view_servo/control/velocity_limiter.h"
 #include "view_servo/views/view_store.h"
+#include "test_paths.h"
 
 #include <actionlib/client/simple_action_client.h>
 #include <geometry_msgs/TwistStamped.h>
@@ -114,7 +115,7 @@ TEST(ArmReplay, HomographiesAndTwistsAgreeWithTheTruth)
   const TemporaryDirectory directory;
   const std::string bag = directory.path() / "approach.bag";
   const std::string file = PACKAGE_DIR "/config/worlds/rice.yaml";
-  const std::string command = "'" RECORD_BAG_BINARY "' '" + file + "' approach '" + bag +
+  const std::string command = "'" RECORD_BAG_PATH "' '" + file + "' approach '" + bag +
                               "' --rate 30 --urdf '" PACKAGE_DIR "/urdf/puma560.urdf'";
   ASSERT_EQ(std::system(command.c_str()), 0) << command;
   const sim::World world = sim::readWorld(file);

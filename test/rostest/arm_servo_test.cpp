@@ -6,6 +6,7 @@
 #include "view_servo/ServoError.h"
 #include "view_servo/ServoToViewAction.h"
 #include "view_servo/tracking/plane_tracker.h"
+#include "test_paths.h"
 
 #include <geometry_msgs/TwistStamped.h>
 #include <sensor_msgs/JointState.h>

@@ -2,7 +2,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "child_process.h"
 #include "node_test.h"
-#include "nodes/robot_messages.h"
+#include "sim_ros/robot_messages.h"
 #include "support/recorded_bag.h"
 #include "support/temporary_directory.h"
 
@@ -11,6 +11,7 @@
 #include "view_servo/SetView.h"
 #include "view_servo/geometry/homography.h"
 #include "view_servo/views/view_store.h"
+#include "test_paths.h"
 
 #include <geometry_msgs/PoseStamped.h>
 #include <gtest/gtest.h>
@@ -68,7 +69,7 @@ protected:
     const std::string world = directory_->path() / "wall.yaml";
     std::ofstream(world) << WORLD;
     bag_ = directory_->path() / "run.bag";
-    const std::string command = "'" RECORD_BAG_BINARY "' '" + world + "' way '" + bag_ + "'";
+    const std::string command = "'" RECORD_BAG_PATH "' '" + world + "' way '" + bag_ + "'";
     ASSERT_EQ(std::system(command.c_str()), 0) << command;
 
     StoredView first;
@@ -279,7 +280,7 @@ protected:
 TEST_P(ShippedRunTest, EachImageIsAnsweredTrulyOrRefused)
 {
   const std::string bag = directory_->path() / (std::string(GetParam().world) + "_" + GetParam().trajectory + ".bag");
-  const std::string command = "'" RECORD_BAG_BINARY "' '" PACKAGE_DIR "/config/worlds/" +
+  const std::string command = "'" RECORD_BAG_PATH "' '" PACKAGE_DIR "/config/worlds/" +
                               std::string(GetParam().world) + ".yaml' " + GetParam().trajectory + " '" + bag +
                               "' --rate 1";
   ASSERT_EQ(std::system(command.c_str()), 0) << command;

@@ -2,7 +2,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "child_process.h"
 #include "node_test.h"
-#include "nodes/robot_messages.h"
+#include "sim_ros/robot_messages.h"
 #include "sim/nomad.h"
 #include "sim/renderer.h"
 #include "support/recorded_bag.h"
@@ -12,6 +12,7 @@
 #include "view_servo/SetView.h"
 #include "view_servo/geometry/planar_motion.h"
 #include "view_servo/views/view_store.h"
+#include "test_paths.h"
 
 #include <gtest/gtest.h>
 
@@ -49,7 +50,7 @@ TEST_P(HomingReplayTest, HeadingsAndArrivalAgreeWithTheTruth)
   const TemporaryDirectory directory;
   const std::string bag = directory.path() / "approach.bag";
   const std::string file = std::string(PACKAGE_DIR "/config/worlds/") + GetParam() + ".yaml";
-  const std::string command = "'" RECORD_BAG_BINARY "' '" + file + "' approach '" + bag + "'";
+  const std::string command = "'" RECORD_BAG_PATH "' '" + file + "' approach '" + bag + "'";
   ASSERT_EQ(std::system(command.c_str()), 0) << command;
   const sim::World world = sim::readWorld(file);
   const sim::Nomad at_goal(world, sim::NomadParams());

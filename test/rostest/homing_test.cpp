@@ -1,7 +1,7 @@
 // Copyright (c) 2026, the view_servo authors
 // SPDX-License-Identifier: BSD-3-Clause
 #include "driver_cases.h"
-#include "nodes/robot_messages.h"
+#include "sim_ros/robot_messages.h"
 #include "sim/nomad.h"
 #include "sim/renderer.h"
 #include "sim/world.h"
@@ -11,8 +11,9 @@
 #include "view_servo/LineMatches.h"
 #include "view_servo/PointMatches.h"
 #include "view_servo/geometry/planar_motion.h"
-#include "view_servo/views/view_matcher.h"
+#include "view_servo/views/point_view_matcher.h"
 #include "view_servo/views/view_store.h"
+#include "test_paths.h"
 
 #include <geometry_msgs/Twist.h>
 #include <tf2_ros/static_transform_broadcaster.h>
@@ -42,7 +43,7 @@ struct Scene
     base = { -0.8, 0.2, 0.05 };
     nomad.setPose(sim::planarPose(base.x, base.y, base.yaw));
     image = camera.capture(nomad.cameraPose());
-    const ViewMatcher matcher{ ViewMatcherParams() };
+    const PointViewMatcher matcher{ PointViewMatcherParams() };
     matches =
         toPointMatches(matcher
                            .match(PreparedImage(view, cv::Rect(), matcher.params().points),

@@ -8,6 +8,7 @@
 #include "view_servo/SetView.h"
 #include "view_servo/WantedView.h"
 #include "view_servo/views/view_store.h"
+#include "test_paths.h"
 
 #include <gtest/gtest.h>
 #include <sensor_msgs/Image.h>
@@ -104,7 +105,7 @@ Eigen::Matrix3d placed(double scale, double u, double v)
   return h;
 }
 
-class HomographyTrackerTest : public ::testing::Test
+class HomographyAlignerTest : public ::testing::Test
 {
 protected:
   static void SetUpTestSuite()
@@ -251,7 +252,7 @@ protected:
   const ros::Publisher wanted_ = ros::NodeHandle().advertise<WantedView>("wanted_view", 1, true);
 };
 
-TEST_F(HomographyTrackerTest, FollowsAView)
+TEST_F(HomographyAlignerTest, FollowsAView)
 {
   follow(exampleHomography());
   const Homography found = *homographies_.last();
@@ -276,7 +277,7 @@ TEST_F(HomographyTrackerTest, FollowsAView)
   }
 }
 
-TEST_F(HomographyTrackerTest, DrawsWhatItFollows)
+TEST_F(HomographyAlignerTest, DrawsWhatItFollows)
 {
   const Recorder<sensor_msgs::Image> overlay("homography_tracker/overlay");
   follow(exampleHomography());
@@ -285,7 +286,7 @@ TEST_F(HomographyTrackerTest, DrawsWhatItFollows)
   EXPECT_EQ(overlay.last()->width, 480u);
 }
 
-TEST_F(HomographyTrackerTest, StopsWhenTold)
+TEST_F(HomographyAlignerTest, StopsWhenTold)
 {
   follow(exampleHomography());
   std_srvs::Trigger service;
@@ -297,7 +298,7 @@ TEST_F(HomographyTrackerTest, StopsWhenTold)
   EXPECT_LT(homographies_.last()->header.stamp, then);
 }
 
-TEST_F(HomographyTrackerTest, RefusesWhatItCannotFollowAndGoesOnWithWhatItFollowed)
+TEST_F(HomographyAlignerTest, RefusesWhatItCannotFollowAndGoesOnWithWhatItFollowed)
 {
   follow(exampleHomography());
   const auto refused = [](const SetView::Response& response, const std::string& words) {
@@ -321,7 +322,7 @@ TEST_F(HomographyTrackerTest, RefusesWhatItCannotFollowAndGoesOnWithWhatItFollow
   expectTracking(exampleHomography());
 }
 
-TEST_F(HomographyTrackerTest, FindsTheViewAgainAfterAnOcclusion)
+TEST_F(HomographyAlignerTest, FindsTheViewAgainAfterAnOcclusion)
 {
   follow(exampleHomography());
   const cv::Mat image = warped(picture(), exampleHomography());
@@ -339,7 +340,7 @@ TEST_F(HomographyTrackerTest, FindsTheViewAgainAfterAnOcclusion)
   expectTracking(exampleHomography());
 }
 
-TEST_F(HomographyTrackerTest, FindsTheViewAnewSomewhereElse)
+TEST_F(HomographyAlignerTest, FindsTheViewAnewSomewhereElse)
 {
   follow(exampleHomography());
   const ros::Time seen = camera_.show(blank());
@@ -349,7 +350,7 @@ TEST_F(HomographyTrackerTest, FindsTheViewAnewSomewhereElse)
   expectTracking(elsewhere);
 }
 
-TEST_F(HomographyTrackerTest, DoesNotFollowAViewThatIsSeenTwice)
+TEST_F(HomographyAlignerTest, DoesNotFollowAViewThatIsSeenTwice)
 {
   const Eigen::Matrix3d left = placed(0.48, 4.0, 90.0);
   const Eigen::Matrix3d right = placed(0.48, 246.0, 90.0);
@@ -369,7 +370,7 @@ TEST_F(HomographyTrackerTest, DoesNotFollowAViewThatIsSeenTwice)
   expectTracking(left);
 }
 
-TEST_F(HomographyTrackerTest, LooksAnewWhenTimeGoesBack)
+TEST_F(HomographyAlignerTest, LooksAnewWhenTimeGoesBack)
 {
   follow(exampleHomography());
   camera_.set(true, 3.0);
@@ -378,7 +379,7 @@ TEST_F(HomographyTrackerTest, LooksAnewWhenTimeGoesBack)
   expectTracking(exampleHomography());
 }
 
-TEST_F(HomographyTrackerTest, FollowsTheViewThatADriverWants)
+TEST_F(HomographyAlignerTest, FollowsTheViewThatADriverWants)
 {
   camera_.show(warped(picture(), exampleHomography()));
   for (const std::string goal : { "goal 1", "goal 2" })
@@ -398,7 +399,7 @@ TEST_F(HomographyTrackerTest, FollowsTheViewThatADriverWants)
   EXPECT_TRUE(waitForAnswer(homographies_, "", [](const Homography& message) { return message.valid != 0; }));
 }
 
-TEST_F(HomographyTrackerTest, NoneFromADriverLeavesAPersonsViewAlone)
+TEST_F(HomographyAlignerTest, NoneFromADriverLeavesAPersonsViewAlone)
 {
   follow(exampleHomography());
   want("", "an old goal");
@@ -408,7 +409,7 @@ TEST_F(HomographyTrackerTest, NoneFromADriverLeavesAPersonsViewAlone)
   EXPECT_EQ(homographies_.last()->view, "goal");
 }
 
-TEST_F(HomographyTrackerTest, RefusesWhatADriverCannotHave)
+TEST_F(HomographyAlignerTest, RefusesWhatADriverCannotHave)
 {
   expectRefusal("unknown", "1", "unknown");
   expectRefusal("../goal", "2", "../goal");
@@ -425,7 +426,7 @@ TEST_F(HomographyTrackerTest, RefusesWhatADriverCannotHave)
   EXPECT_EQ(homographies_.last()->goal, "6");
 }
 
-TEST_F(HomographyTrackerTest, SaysWhatIsLackingUntilItIsThere)
+TEST_F(HomographyAlignerTest, SaysWhatIsLackingUntilItIsThere)
 {
   const auto waits = [](const std::string& words) {
     return [words](const Homography& message) {
@@ -455,7 +456,7 @@ TEST_F(HomographyTrackerTest, SaysWhatIsLackingUntilItIsThere)
   EXPECT_TRUE(waitForAnswer(homographies_, "early", waits("no image comes on '/camera/image_raw'")));
 }
 
-TEST_F(HomographyTrackerTest, RefusesImagesOfAnotherCalibrationUntilItIsChosenAnew)
+TEST_F(HomographyAlignerTest, RefusesImagesOfAnotherCalibrationUntilItIsChosenAnew)
 {
   camera_.show(picture());
   want("goal", "before");
@@ -470,7 +471,7 @@ TEST_F(HomographyTrackerTest, RefusesImagesOfAnotherCalibrationUntilItIsChosenAn
   EXPECT_TRUE(waitForAnswer(homographies_, "", [](const Homography& message) { return message.valid != 0; }));
 }
 
-TEST_F(HomographyTrackerTest, OutlivesWhatACameraShouldNotSend)
+TEST_F(HomographyAlignerTest, OutlivesWhatACameraShouldNotSend)
 {
   const FakeCamera camera("camera");
   ASSERT_TRUE(camera.waitForSubscribers(2));
@@ -503,7 +504,7 @@ TEST_F(HomographyTrackerTest, OutlivesWhatACameraShouldNotSend)
 }
 
 /** Nodes that the test starts itself. */
-class TrackerProcessTest : public HomographyTrackerTest
+class TrackerProcessTest : public HomographyAlignerTest
 {
 protected:
   std::vector<std::string> command(const std::string& name, const std::vector<std::string>& more = {}) const

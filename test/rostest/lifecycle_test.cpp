@@ -10,6 +10,7 @@
 #include "view_servo/PointMatches.h"
 #include "view_servo/SaveView.h"
 #include "view_servo/SetView.h"
+#include "test_paths.h"
 
 #include <gtest/gtest.h>
 

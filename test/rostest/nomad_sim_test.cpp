@@ -1,9 +1,10 @@
 // Copyright (c) 2026, the view_servo authors
 // SPDX-License-Identifier: BSD-3-Clause
 #include "node_test.h"
-#include "nodes/robot_messages.h"
+#include "sim_ros/robot_messages.h"
 #include "view_servo/SetLight.h"
 #include "view_servo/SetPose.h"
+#include "test_paths.h"
 
 #include <geometry_msgs/PoseStamped.h>
 #include <geometry_msgs/Twist.h>

@@ -1,6 +1,7 @@
 // Copyright (c) 2026, the view_servo authors
 // SPDX-License-Identifier: BSD-3-Clause
 #include "sim/puma.h"
+#include "test_paths.h"
 
 #include <gtest/gtest.h>
 #include <Eigen/SVD>
@@ -35,7 +36,7 @@ const Joints DOWN = (Joints() << 0.0, 1.2, -3.1, 0.0, -1.241593, 0.0).finished()
 
 std::string urdf()
 {
-  std::ifstream file(URDF_DIR "/puma560.urdf");
+  std::ifstream file(PACKAGE_DIR "/urdf/puma560.urdf");
   return std::string(std::istreambuf_iterator<char>(file), {});
 }
 

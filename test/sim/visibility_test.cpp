@@ -3,6 +3,7 @@
 #include "sim/visibility.h"
 
 #include "sim/nomad.h"
+#include "test_paths.h"
 
 #include <gtest/gtest.h>
 
@@ -114,7 +115,7 @@ TEST(FirstHit, GroupsAreNotShown)
 
 TEST(FirstHit, MeetsTheDesksBackWall)
 {
-  const World world = readWorld(std::string(WORLDS_DIR) + "/desk.yaml");
+  const World world = readWorld(PACKAGE_DIR "/config/worlds/desk.yaml");
   // Above all that stands there; the wall is at x = 3.2, the floor 1 m below.
   EXPECT_NEAR(distanceAlong(world, { 0.0, 0.0, 2.2 }, { 1.0, 0.0, 0.0 }), 3.2, 1e-9);
   EXPECT_NEAR(distanceAlong(world, { -1.0, 0.0, 1.0 }, { 0.0, 0.0, -1.0 }), 1.0, 1e-9);
@@ -125,7 +126,7 @@ TEST(ShareInSight, IsOneFromTheSamePose)
   EXPECT_EQ(shareInSight(wallWorld(), cameraAt(0.0, 0.0), cameraAt(0.0, 0.0)), 1.0);
   for (const char* name : { "desk", "cabinet", "corridor" })
   {
-    const World world = readWorld(std::string(WORLDS_DIR) + "/" + name + ".yaml");
+    const World world = readWorld(std::string(PACKAGE_DIR "/config/worlds/") + name + ".yaml");
     const Eigen::Isometry3d pose = Nomad(world, {}).cameraPose();
     EXPECT_EQ(shareInSight(world, pose, pose), 1.0) << name;
   }

@@ -6,6 +6,7 @@
 #include "sim/renderer.h"
 #include "sim/textures.h"
 #include "support/temporary_directory.h"
+#include "test_paths.h"
 
 #include <gtest/gtest.h>
 #include <opencv2/core.hpp>
@@ -27,7 +28,7 @@ namespace fs = std::filesystem;
 std::vector<std::string> worldFiles()
 {
   std::vector<std::string> files;
-  for (const auto& entry : fs::directory_iterator(WORLDS_DIR))
+  for (const auto& entry : fs::directory_iterator(PACKAGE_DIR "/config/worlds"))
   {
     if (entry.path().extension() == ".yaml")
     {
@@ -142,7 +143,7 @@ TEST(World, FaultsNameFileAndLine)
 
 TEST(World, NamesTheStartsThereAre)
 {
-  const World world = readWorld(std::string(WORLDS_DIR) + "/desk.yaml");
+  const World world = readWorld(PACKAGE_DIR "/config/worlds/desk.yaml");
   EXPECT_NO_THROW(world.start("thesis"));
   try
   {

@@ -3,6 +3,7 @@
 // Runs the program itself, as a shell would.
 #include "support/temporary_directory.h"
 #include "support/textured_plane.h"
+#include "test_paths.h"
 
 #include <gtest/gtest.h>
 #include <nlohmann/json.hpp>
@@ -96,7 +97,7 @@ protected:
 
   Outcome run(const std::vector<std::string>& arguments) const
   {
-    std::string command = "'" MATCH_IMAGES_BINARY "'";
+    std::string command = "'" MATCH_IMAGES_PATH "'";
     for (const std::string& argument : arguments)
     {
       command += " '" + argument + "'";

@@ -1,11 +1,12 @@
 // Copyright (c) 2026, the view_servo authors
 // SPDX-License-Identifier: BSD-3-Clause
 // Runs the program itself, as a shell would, and reads what it wrote.
-#include "nodes/robot_messages.h"
+#include "sim_ros/robot_messages.h"
 #include "sim/puma.h"
 #include "sim/world.h"
 #include "support/temporary_directory.h"
 #include "view_servo/ros/conversions.h"
+#include "test_paths.h"
 
 #include <gtest/gtest.h>
 #include <rosbag/bag.h>
@@ -196,7 +197,7 @@ protected:
   /** @param before commands that the shell carries out first. */
   Outcome run(const std::vector<std::string>& arguments, const std::string& before = ":") const
   {
-    std::string command = before + "; ROS_PACKAGE_PATH='" PACKAGE_DIR "' '" RECORD_BAG_BINARY "'";
+    std::string command = before + "; ROS_PACKAGE_PATH='" PACKAGE_DIR "' '" RECORD_BAG_PATH "'";
     for (const std::string& argument : arguments)
     {
       command += " '" + argument + "'";

@@ -1,11 +1,12 @@
 // Copyright (c) 2026, the view_servo authors
 // SPDX-License-Identifier: BSD-3-Clause
-#include "view_servo/tracking/homography_tracker.h"
+#include "view_servo/tracking/homography_aligner.h"
 
 #include "sim/renderer.h"
 #include "sim/world.h"
 #include "support/textured_plane.h"
 #include "view_servo/geometry/homography.h"
+#include "test_paths.h"
 
 #include <gtest/gtest.h>
 #include <Eigen/Geometry>
@@ -49,9 +50,9 @@ private:
   Eigen::Matrix3d to_reference_;
 };
 
-HomographyTracker trackerOf(const Plane& plane)
+HomographyAligner trackerOf(const Plane& plane)
 {
-  return HomographyTracker(plane.reference(), cv::Rect(), HomographyTrackerParams());
+  return HomographyAligner(plane.reference(), cv::Rect(), HomographyAlignerParams());
 }
 
 /** A motion in the image by `pixels` in a direction [rad], in front of another homography. */
@@ -72,11 +73,11 @@ Eigen::Matrix3d rolled(double angle, double scale)
   return h;
 }
 
-std::string messageOf(const cv::Mat& reference, const cv::Rect& region, const HomographyTrackerParams& params)
+std::string messageOf(const cv::Mat& reference, const cv::Rect& region, const HomographyAlignerParams& params)
 {
   try
   {
-    const HomographyTracker tracker(reference, region, params);
+    const HomographyAligner tracker(reference, region, params);
   }
   catch (const std::invalid_argument& error)
   {
@@ -87,9 +88,9 @@ std::string messageOf(const cv::Mat& reference, const cv::Rect& region, const Ho
 
 }  // namespace
 
-TEST(HomographyTrackerParams, NameAllFaultsAtOnce)
+TEST(HomographyAlignerParams, NameAllFaultsAtOnce)
 {
-  HomographyTrackerParams params;
+  HomographyAlignerParams params;
   EXPECT_TRUE(params.validate().empty());
   params.max_points = 3;
   params.patch_radius = 1;
@@ -101,10 +102,10 @@ TEST(HomographyTrackerParams, NameAllFaultsAtOnce)
   EXPECT_EQ(params.validate().size(), 7U);
 }
 
-TEST(HomographyTracker, RefusesWhatItCanNotTrack)
+TEST(HomographyAligner, RefusesWhatItCanNotTrack)
 {
   const cv::Mat reference = Plane(1).reference();
-  HomographyTrackerParams params;
+  HomographyAlignerParams params;
   EXPECT_EQ(messageOf(reference, cv::Rect(), params), "");
   EXPECT_NE(messageOf(cv::Mat(), cv::Rect(), params).find("grey"), std::string::npos);
   EXPECT_NE(messageOf(cv::Mat(100, 100, CV_8UC3), cv::Rect(), params).find("grey"), std::string::npos);
@@ -112,15 +113,15 @@ TEST(HomographyTracker, RefusesWhatItCanNotTrack)
   EXPECT_NE(messageOf(cv::Mat(SIZE, CV_8UC1, cv::Scalar(80)), cv::Rect(), params).find("0 corners"), std::string::npos);
   params.levels = 9;
   EXPECT_NE(messageOf(reference, cv::Rect(), params).find("levels"), std::string::npos);
-  const HomographyTracker tracker(reference, cv::Rect(), HomographyTrackerParams());
+  const HomographyAligner tracker(reference, cv::Rect(), HomographyAlignerParams());
   EXPECT_THROW(tracker.track(cv::Mat(), Eigen::Matrix3d::Identity()), std::invalid_argument);
   EXPECT_THROW(tracker.track(cv::Mat(100, 100, CV_8UC3), Eigen::Matrix3d::Identity()), std::invalid_argument);
 }
 
-TEST(HomographyTracker, FindsTheHomographyToAFractionOfAPixel)
+TEST(HomographyAligner, FindsTheHomographyToAFractionOfAPixel)
 {
   const Plane plane(2);
-  const HomographyTracker tracker = trackerOf(plane);
+  const HomographyAligner tracker = trackerOf(plane);
   for (const Eigen::Matrix3d& truth : { Eigen::Matrix3d(Eigen::Matrix3d::Identity()), test::exampleHomography(),
                                         rolled(0.4, 1.0), rolled(-0.2, 1.3), rolled(0.1, 0.75) })
   {
@@ -138,10 +139,10 @@ TEST(HomographyTracker, FindsTheHomographyToAFractionOfAPixel)
   }
 }
 
-TEST(HomographyTracker, FollowsFastMotionWithoutPrediction)
+TEST(HomographyAligner, FollowsFastMotionWithoutPrediction)
 {
   const Plane plane(3);
-  const HomographyTracker tracker = trackerOf(plane);
+  const HomographyAligner tracker = trackerOf(plane);
   for (const double direction : { 0.3, 2.0, 4.0 })
   {
     const Eigen::Matrix3d truth = shifted(test::exampleHomography(), 30.0, direction);
@@ -151,10 +152,10 @@ TEST(HomographyTracker, FollowsFastMotionWithoutPrediction)
   }
 }
 
-TEST(HomographyTracker, LightDoesNotMatter)
+TEST(HomographyAligner, LightDoesNotMatter)
 {
   const Plane plane(4);
-  const HomographyTracker tracker = trackerOf(plane);
+  const HomographyAligner tracker = trackerOf(plane);
   const Eigen::Matrix3d truth = test::exampleHomography();
   const cv::Mat image = plane.seen(truth);
   cv::Mat uneven;
@@ -176,10 +177,10 @@ TEST(HomographyTracker, LightDoesNotMatter)
   }
 }
 
-TEST(HomographyTracker, IsNotMisledByWhatCoversAPart)
+TEST(HomographyAligner, IsNotMisledByWhatCoversAPart)
 {
   const Plane plane(5);
-  const HomographyTracker tracker = trackerOf(plane);
+  const HomographyAligner tracker = trackerOf(plane);
   const cv::Mat other = test::texturedPicture(77, SIZE);
   const Eigen::Matrix3d truth = test::exampleHomography();
   for (const double left : { 0.0, 0.3, 0.6 })
@@ -195,19 +196,19 @@ TEST(HomographyTracker, IsNotMisledByWhatCoversAPart)
 }
 
 /** They tell more than the corners, whatever the light and what is hidden. */
-TEST(HomographyTracker, AllPixelsHaveTheLastWord)
+TEST(HomographyAligner, AllPixelsHaveTheLastWord)
 {
   constexpr int PLACES = 8;
   constexpr double DISTANCE = 0.46;  // of the printed face from the world's goal [m]
-  sim::World world = sim::readWorld(std::string(WORLDS_DIR) + "/rice.yaml");
+  sim::World world = sim::readWorld(PACKAGE_DIR "/config/worlds/rice.yaml");
   world.quality.noise = 2.0;
   sim::SimulatedCamera camera(world, {}, 1);
   const cv::Mat reference = camera.capture(world.goal);
   camera.setLight({ 0.7, 15.0, 0.4 });
-  HomographyTrackerParams unrefined;
+  HomographyAlignerParams unrefined;
   unrefined.refine = false;
-  const HomographyTracker all_pixels(reference, world.region, HomographyTrackerParams());
-  const HomographyTracker corners(reference, world.region, unrefined);
+  const HomographyAligner all_pixels(reference, world.region, HomographyAlignerParams());
+  const HomographyAligner corners(reference, world.region, unrefined);
   const auto error = [&world](const Eigen::Matrix3d& h, const Eigen::Matrix3d& truth) {
     double worst = 0.0;
     for (const cv::Point& corner : { world.region.tl(), world.region.br() })
@@ -247,10 +248,10 @@ TEST(HomographyTracker, AllPixelsHaveTheLastWord)
   }
 }
 
-TEST(HomographyTracker, FindsNothingWhereTheViewIsNot)
+TEST(HomographyAligner, FindsNothingWhereTheViewIsNot)
 {
   const Plane plane(6);
-  const HomographyTracker tracker = trackerOf(plane);
+  const HomographyAligner tracker = trackerOf(plane);
   const Eigen::Matrix3d identity = Eigen::Matrix3d::Identity();
   for (const cv::Mat& image : { test::texturedPicture(78, SIZE), test::blotchedPicture(3, 2.0, SIZE),
                                 cv::Mat(SIZE, CV_8UC1, cv::Scalar(0)), cv::Mat(SIZE, CV_8UC1, cv::Scalar(200)) })
@@ -264,10 +265,10 @@ TEST(HomographyTracker, FindsNothingWhereTheViewIsNot)
   EXPECT_FALSE(tracker.track(plane.reference(), -identity).found);
 }
 
-TEST(HomographyTracker, FindsTheRightOneOrNone)
+TEST(HomographyAligner, FindsTheRightOneOrNone)
 {
   const Plane plane(7);
-  const HomographyTracker tracker = trackerOf(plane);
+  const HomographyAligner tracker = trackerOf(plane);
   int found = 0;
   for (int i = 0; i < 40; ++i)
   {
@@ -282,10 +283,10 @@ TEST(HomographyTracker, FindsTheRightOneOrNone)
   EXPECT_GE(found, 10);
 }
 
-TEST(HomographyTracker, BearsAnyPrediction)
+TEST(HomographyAligner, BearsAnyPrediction)
 {
   const Plane plane(11);
-  const HomographyTracker tracker = trackerOf(plane);
+  const HomographyAligner tracker = trackerOf(plane);
   const cv::Mat image = plane.reference();
   cv::RNG rng(1);
   for (int i = 0; i < 200; ++i)
@@ -306,14 +307,14 @@ TEST(HomographyTracker, BearsAnyPrediction)
   EXPECT_FALSE(tracker.track(image, Eigen::Matrix3d::Constant(std::nan(""))).found);
 }
 
-TEST(HomographyTracker, TracksTheRegionWhateverTheGroundDoes)
+TEST(HomographyAligner, TracksTheRegionWhateverTheGroundDoes)
 {
   const Plane plane(8);
   const Plane ground(9);
   const cv::Rect region(120, 90, 240, 180);
   cv::Mat reference = ground.reference();
   plane.reference()(region).copyTo(reference(region));
-  const HomographyTracker tracker(reference, region, HomographyTrackerParams());
+  const HomographyAligner tracker(reference, region, HomographyAlignerParams());
   for (const Eigen::Vector2d& point : tracker.points())
   {
     EXPECT_TRUE(region.contains(cv::Point(static_cast<int>(point.x()), static_cast<int>(point.y()))));
@@ -333,7 +334,7 @@ TEST(HomographyTracker, TracksTheRegionWhateverTheGroundDoes)
   EXPECT_LT(test::cornerError(result.h, truth, SIZE), 0.8);
 }
 
-TEST(HomographyTracker, GivesTheSameForTheSame)
+TEST(HomographyAligner, GivesTheSameForTheSame)
 {
   const Plane plane(10);
   const cv::Mat image = test::disturbed(plane.seen(test::exampleHomography()), 0.9, 5.0, 3.0);

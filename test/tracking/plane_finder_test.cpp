@@ -70,7 +70,7 @@ protected:
   const Eigen::Matrix3d left_ = placed(4.0, 90.0);
   const Eigen::Matrix3d right_ = placed(246.0, 90.0);
   const cv::Mat picture_ = texturedPicture(1, SIZE);
-  const PlaneFinder finder_{ ViewMatcherParams() };
+  const PlaneFinder finder_{ PointViewMatcherParams() };
   const std::shared_ptr<const PreparedImage> view_ =
       std::make_shared<const PreparedImage>(picture_, cv::Rect(), finder_.features());
 };
@@ -152,7 +152,7 @@ TEST_F(PlaneFinderTest, SaysWhatIsWrongWithAView)
 
 TEST_F(PlaneFinderTest, RefusesFaultyParameters)
 {
-  ViewMatcherParams params;
+  PointViewMatcherParams params;
   params.min_log_significance = -1.0;
   EXPECT_THROW(PlaneFinder{ params }, std::invalid_argument);
 }

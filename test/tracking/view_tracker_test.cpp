@@ -7,6 +7,7 @@
 #include "sim/world.h"
 #include "support/textured_plane.h"
 #include "view_servo/robust/random.h"
+#include "test_paths.h"
 
 #include <gtest/gtest.h>
 #include <opencv2/core.hpp>
@@ -40,7 +41,7 @@ class Desk
 {
 public:
   Desk()
-    : world_(sim::readWorld(std::string(WORLDS_DIR) + "/desk.yaml")),
+    : world_(sim::readWorld(PACKAGE_DIR "/config/worlds/desk.yaml")),
       mount_(world_.camera_on_base),
       camera_(world_, {}, 1),
       reference_(camera_.capture(cameraAt(base())))

@@ -1,8 +1,9 @@
 // Copyright (c) 2026, the view_servo authors
 // SPDX-License-Identifier: BSD-3-Clause
-#include "sim/arm_trial.h"
+#include "trials/arm_trial.h"
 
 #include "view_servo/geometry/homography.h"
+#include "test_paths.h"
 
 #include <gtest/gtest.h>
 #include <Eigen/Geometry>
@@ -23,12 +24,12 @@ constexpr double DEGREE = M_PI / 180.0;
 
 World worldOf(const std::string& name)
 {
-  return readWorld(std::string(WORLDS_DIR) + "/" + name + ".yaml");
+  return readWorld(std::string(PACKAGE_DIR "/config/worlds/") + name + ".yaml");
 }
 
 std::string pumaUrdf()
 {
-  std::ifstream stream(std::string(URDF_DIR) + "/puma560.urdf");
+  std::ifstream stream(PACKAGE_DIR "/urdf/puma560.urdf");
   return { std::istreambuf_iterator<char>(stream), std::istreambuf_iterator<char>() };
 }
 

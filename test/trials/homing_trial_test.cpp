@@ -1,9 +1,10 @@
 // Copyright (c) 2026, the view_servo authors
 // SPDX-License-Identifier: BSD-3-Clause
-#include "sim/homing_trial.h"
+#include "trials/homing_trial.h"
 
 #include "sim/visibility.h"
 #include "view_servo/robust/random.h"
+#include "test_paths.h"
 
 #include <gtest/gtest.h>
 
@@ -21,7 +22,7 @@ constexpr double DEGREE = M_PI / 180.0;
 
 World worldOf(const std::string& name)
 {
-  return readWorld(std::string(WORLDS_DIR) + "/" + name + ".yaml");
+  return readWorld(std::string(PACKAGE_DIR "/config/worlds/") + name + ".yaml");
 }
 
 /** A pose seen from the world's goal. */

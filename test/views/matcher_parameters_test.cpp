@@ -16,14 +16,14 @@ using view_servo::LineMatcherParams;
 using view_servo::matcherParameters;
 using view_servo::Parameter;
 using view_servo::setParameter;
-using view_servo::ViewMatcherParams;
+using view_servo::PointViewMatcherParams;
 
 template <typename Params>
 class MatcherParameters : public ::testing::Test
 {
 };
 
-using Matchers = ::testing::Types<ViewMatcherParams, LineMatcherParams>;
+using Matchers = ::testing::Types<PointViewMatcherParams, LineMatcherParams>;
 TYPED_TEST_SUITE(MatcherParameters, Matchers, );
 
 TYPED_TEST(MatcherParameters, HaveUniqueDocumentedNames)
@@ -91,7 +91,7 @@ TYPED_TEST(MatcherParameters, EachSetsSomethingOfItsOwn)
 
 TEST(SetParameter, SetsNumbersWordsAndSwitches)
 {
-  ViewMatcherParams params;
+  PointViewMatcherParams params;
   setParameter(params, "max_corners", "321");
   setParameter(params, "inlier_threshold", "2.5");
   setParameter(params, "cyclic_order", "false");
@@ -165,7 +165,7 @@ TEST(MatcherParameterFaults, SayTheNamesOfLineParameters)
 
 TEST(SetParameter, NamesTheNearestWhenAskedForOneThatIsNot)
 {
-  ViewMatcherParams params;
+  PointViewMatcherParams params;
   try
   {
     setParameter(params, "max_corner", "10");
@@ -180,7 +180,7 @@ TEST(SetParameter, NamesTheNearestWhenAskedForOneThatIsNot)
 
 TEST(SetParameter, RefusesValuesOfTheWrongTypeAndLeavesAllAsItWas)
 {
-  ViewMatcherParams params;
+  PointViewMatcherParams params;
   for (const auto& [name, value] :
        std::vector<std::pair<std::string, std::string>>{ { "max_corners", "many" },
                                                          { "max_corners", "3.5" },
@@ -194,7 +194,7 @@ TEST(SetParameter, RefusesValuesOfTheWrongTypeAndLeavesAllAsItWas)
   {
     EXPECT_THROW(setParameter(params, name, value), std::invalid_argument) << name << " = '" << value << "'";
   }
-  ViewMatcherParams fresh;
+  PointViewMatcherParams fresh;
   const auto now = matcherParameters(params);
   const auto then = matcherParameters(fresh);
   for (std::size_t i = 0; i < now.size(); ++i)

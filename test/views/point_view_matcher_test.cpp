@@ -1,6 +1,6 @@
 // Copyright (c) 2026, the view_servo authors
 // SPDX-License-Identifier: BSD-3-Clause
-#include "view_servo/views/view_matcher.h"
+#include "view_servo/views/point_view_matcher.h"
 
 #include "view_servo/geometry/fundamental.h"
 
@@ -27,8 +27,8 @@ using view_servo::MatchOutcome;
 using view_servo::PreparedImage;
 using view_servo::ViewConsistency;
 using view_servo::ViewMatch;
-using view_servo::ViewMatcher;
-using view_servo::ViewMatcherParams;
+using view_servo::PointViewMatcher;
+using view_servo::PointViewMatcherParams;
 using view_servo::test::blotchedPicture;
 using view_servo::test::cornerError;
 using view_servo::test::disturbed;
@@ -46,10 +46,10 @@ Eigen::Matrix3d steepHomography()
   return steep;
 }
 
-ViewMatch matchImages(const ViewMatcherParams& params, const cv::Mat& reference, const cv::Mat& current,
+ViewMatch matchImages(const PointViewMatcherParams& params, const cv::Mat& reference, const cv::Mat& current,
                       GeometryModel model = GeometryModel::HOMOGRAPHY, const cv::Rect& region = cv::Rect())
 {
-  return ViewMatcher(params).match(PreparedImage(reference, region, params.points),
+  return PointViewMatcher(params).match(PreparedImage(reference, region, params.points),
                                    PreparedImage(current, cv::Rect(), params.points), model);
 }
 
@@ -99,11 +99,11 @@ struct Book
   Eigen::Matrix3d fundamental;
 };
 
-TEST(ViewMatcher, FindsThePlaneToAFractionOfAPixel)
+TEST(PointViewMatcher, FindsThePlaneToAFractionOfAPixel)
 {
   const cv::Mat reference = texturedPicture(1);
   const cv::Mat current = disturbed(warpedPicture(reference, exampleHomography(), SIZE), 0.8, 10.0, 2.0);
-  const ViewMatch match = matchImages(ViewMatcherParams(), reference, current);
+  const ViewMatch match = matchImages(PointViewMatcherParams(), reference, current);
   ASSERT_EQ(match.outcome, MatchOutcome::MATCHED) << match.message;
   EXPECT_LT(cornerError(match.matrix, exampleHomography(), SIZE), 0.3);
   EXPECT_EQ(match.matrix(2, 2), 1.0);
@@ -123,12 +123,12 @@ TEST(ViewMatcher, FindsThePlaneToAFractionOfAPixel)
   EXPECT_GT(inliers, 150);
 }
 
-TEST(ViewMatcher, GuidedMatchingFindsMore)
+TEST(PointViewMatcher, GuidedMatchingFindsMore)
 {
   const cv::Mat reference = blotchedPicture(2, 2.0);
   const Eigen::Matrix3d steep = steepHomography();
   const cv::Mat current = disturbed(warpedPicture(reference, steep, SIZE), 0.7, 10.0, 4.0);
-  ViewMatcherParams params;
+  PointViewMatcherParams params;
   const ViewMatch guided = matchImages(params, reference, current);
   params.guided = false;
   const ViewMatch plain = matchImages(params, reference, current);
@@ -137,12 +137,12 @@ TEST(ViewMatcher, GuidedMatchingFindsMore)
   EXPECT_LT(cornerError(guided.matrix, steep, SIZE), cornerError(plain.matrix, steep, SIZE));
 }
 
-TEST(ViewMatcher, FindsEpipolarGeometryOfASceneWithDepth)
+TEST(PointViewMatcher, FindsEpipolarGeometryOfASceneWithDepth)
 {
   const Book book;
   for (const ViewConsistency consistency : { ViewConsistency::OFF, ViewConsistency::BEFORE, ViewConsistency::WITHIN })
   {
-    ViewMatcherParams params;
+    PointViewMatcherParams params;
     params.view_consistency = consistency;
     const ViewMatch match = matchImages(params, book.reference, book.current, GeometryModel::FUNDAMENTAL);
     ASSERT_EQ(match.outcome, MatchOutcome::MATCHED) << match.message;
@@ -158,12 +158,12 @@ TEST(ViewMatcher, FindsEpipolarGeometryOfASceneWithDepth)
   }
 }
 
-TEST(ViewMatcher, SeveralHypothesesFindTheSameGeometryFromMoreMatches)
+TEST(PointViewMatcher, SeveralHypothesesFindTheSameGeometryFromMoreMatches)
 {
   const cv::Mat reference = blotchedPicture(2, 2.0);
   const cv::Mat current = disturbed(warpedPicture(reference, steepHomography(), SIZE), 0.7, 10.0, 4.0);
   const Book book;
-  ViewMatcherParams params;
+  PointViewMatcherParams params;
   params.guided = false;
   const ViewMatch plane = matchImages(params, reference, current);
   const ViewMatch pages = matchImages(params, book.reference, book.current, GeometryModel::FUNDAMENTAL);
@@ -191,20 +191,20 @@ TEST(ViewMatcher, SeveralHypothesesFindTheSameGeometryFromMoreMatches)
   }
 }
 
-TEST(ViewMatcherParams, FilteringCandidatesNeedsAnEstimatorThatKeepsToThem)
+TEST(PointViewMatcherParams, FilteringCandidatesNeedsAnEstimatorThatKeepsToThem)
 {
-  ViewMatcherParams params;
+  PointViewMatcherParams params;
   params.view_consistency = ViewConsistency::BEFORE;
   EXPECT_TRUE(params.validate().empty());
   params.estimator = GeometryEstimator::MULTI_HYPOTHESIS;
   EXPECT_EQ(params.validate().size(), 1U);
 }
 
-TEST(ViewMatcher, WorksWithUniformSamplingAndWithoutLocalOptimisation)
+TEST(PointViewMatcher, WorksWithUniformSamplingAndWithoutLocalOptimisation)
 {
   const cv::Mat reference = texturedPicture(3);
   const cv::Mat current = warpedPicture(reference, exampleHomography(), SIZE);
-  ViewMatcherParams params;
+  PointViewMatcherParams params;
   params.ransac.sampling = view_servo::Sampling::UNIFORM;
   params.ransac.local_optimizations = 0;
   params.ransac.improvement_stage = true;
@@ -213,7 +213,7 @@ TEST(ViewMatcher, WorksWithUniformSamplingAndWithoutLocalOptimisation)
   EXPECT_LT(cornerError(match.matrix, exampleHomography(), SIZE), 0.5);
 }
 
-TEST(ViewMatcher, FindsAViewThatIsMuchSmallerOrLarger)
+TEST(PointViewMatcher, FindsAViewThatIsMuchSmallerOrLarger)
 {
   const cv::Mat reference = blotchedPicture(4, 1.5, cv::Size(800, 600));
   Eigen::Matrix3d shrink = Eigen::Matrix3d::Identity();
@@ -224,7 +224,7 @@ TEST(ViewMatcher, FindsAViewThatIsMuchSmallerOrLarger)
   cv::GaussianBlur(reference, blurred, cv::Size(), 1.2);  // what the smaller image cannot show
   const cv::Mat current = warpedPicture(blurred, shrink, reference.size());
 
-  ViewMatcherParams params;
+  PointViewMatcherParams params;
   const ViewMatch smaller = matchImages(params, reference, current);
   ASSERT_EQ(smaller.outcome, MatchOutcome::MATCHED) << smaller.message;
   EXPECT_GT(smaller.reference_level, smaller.current_level);
@@ -239,14 +239,14 @@ TEST(ViewMatcher, FindsAViewThatIsMuchSmallerOrLarger)
   EXPECT_EQ(matchImages(params, reference, current).outcome, MatchOutcome::NO_GEOMETRY);
 }
 
-TEST(ViewMatcher, FindsNothingInUnrelatedPictures)
+TEST(PointViewMatcher, FindsNothingInUnrelatedPictures)
 {
   for (const GeometryModel model : { GeometryModel::HOMOGRAPHY, GeometryModel::FUNDAMENTAL })
   {
     for (int seed = 0; seed < 4; ++seed)
     {
       const ViewMatch match =
-          matchImages(ViewMatcherParams(), texturedPicture(100 + seed), texturedPicture(200 + seed), model);
+          matchImages(PointViewMatcherParams(), texturedPicture(100 + seed), texturedPicture(200 + seed), model);
       EXPECT_EQ(match.outcome, MatchOutcome::NO_GEOMETRY) << "seed " << seed << ": " << match.message;
       EXPECT_EQ(match.inliers, 0);
       EXPECT_TRUE(match.matrix.array().isNaN().all());
@@ -259,7 +259,7 @@ TEST(ViewMatcher, FindsNothingInUnrelatedPictures)
   }
 }
 
-TEST(ViewMatcher, FindsNothingInAMirroredPicture)
+TEST(PointViewMatcher, FindsNothingInAMirroredPicture)
 {
   for (const GeometryModel model : { GeometryModel::HOMOGRAPHY, GeometryModel::FUNDAMENTAL })
   {
@@ -268,40 +268,40 @@ TEST(ViewMatcher, FindsNothingInAMirroredPicture)
       const cv::Mat reference = texturedPicture(300 + seed);
       cv::Mat mirrored;
       cv::flip(reference, mirrored, 1);
-      const ViewMatch match = matchImages(ViewMatcherParams(), reference, mirrored, model);
+      const ViewMatch match = matchImages(PointViewMatcherParams(), reference, mirrored, model);
       EXPECT_EQ(match.outcome, MatchOutcome::NO_GEOMETRY) << "seed " << seed << ": " << match.message;
     }
   }
 }
 
-TEST(ViewMatcher, SaysWhenThereIsNothingToMatch)
+TEST(PointViewMatcher, SaysWhenThereIsNothingToMatch)
 {
   const cv::Mat flat(SIZE, CV_8UC1, cv::Scalar(90));
   for (const GeometryModel model : { GeometryModel::HOMOGRAPHY, GeometryModel::FUNDAMENTAL })
   {
-    const ViewMatch match = matchImages(ViewMatcherParams(), texturedPicture(1), flat, model);
+    const ViewMatch match = matchImages(PointViewMatcherParams(), texturedPicture(1), flat, model);
     EXPECT_EQ(match.outcome, MatchOutcome::TOO_FEW_FEATURES);
     EXPECT_NE(match.message.find("0 in the current image"), std::string::npos) << match.message;
     EXPECT_TRUE(match.matches.empty());
   }
 }
 
-TEST(ViewMatcher, TakesImagesOfDifferentSizes)
+TEST(PointViewMatcher, TakesImagesOfDifferentSizes)
 {
   const cv::Mat reference = texturedPicture(5);
   const cv::Size wide(620, 300);
   const ViewMatch match =
-      matchImages(ViewMatcherParams(), reference, warpedPicture(reference, exampleHomography(), wide));
+      matchImages(PointViewMatcherParams(), reference, warpedPicture(reference, exampleHomography(), wide));
   ASSERT_EQ(match.outcome, MatchOutcome::MATCHED);
   EXPECT_LT(cornerError(match.matrix, exampleHomography(), SIZE), 0.5);
 }
 
-TEST(ViewMatcher, LooksOnlyInTheRegionOfInterest)
+TEST(PointViewMatcher, LooksOnlyInTheRegionOfInterest)
 {
   const cv::Mat reference = texturedPicture(6);
   const cv::Rect region(120, 60, 260, 240);
   const ViewMatch match =
-      matchImages(ViewMatcherParams(), reference, warpedPicture(reference, exampleHomography(), SIZE),
+      matchImages(PointViewMatcherParams(), reference, warpedPicture(reference, exampleHomography(), SIZE),
                   GeometryModel::HOMOGRAPHY, region);
   ASSERT_EQ(match.outcome, MatchOutcome::MATCHED);
   for (const MatchedPoint& point : match.matches)
@@ -310,15 +310,15 @@ TEST(ViewMatcher, LooksOnlyInTheRegionOfInterest)
   }
 }
 
-TEST(ViewMatcher, GivesTheSameResultEveryTime)
+TEST(PointViewMatcher, GivesTheSameResultEveryTime)
 {
   const cv::Mat reference = texturedPicture(7);
   const cv::Mat current = disturbed(warpedPicture(reference, exampleHomography(), SIZE), 0.9, 5.0, 3.0);
   const int threads = cv::getNumThreads();
   cv::setNumThreads(1);
-  const ViewMatch one = matchImages(ViewMatcherParams(), reference, current);
+  const ViewMatch one = matchImages(PointViewMatcherParams(), reference, current);
   cv::setNumThreads(3);
-  const ViewMatch three = matchImages(ViewMatcherParams(), reference, current);
+  const ViewMatch three = matchImages(PointViewMatcherParams(), reference, current);
   cv::setNumThreads(threads);
   EXPECT_EQ(one.matrix, three.matrix);
   ASSERT_EQ(one.matches.size(), three.matches.size());
@@ -328,11 +328,11 @@ TEST(ViewMatcher, GivesTheSameResultEveryTime)
   }
 }
 
-TEST(ViewMatcher, TakesTheThresholdOfTheCall)
+TEST(PointViewMatcher, TakesTheThresholdOfTheCall)
 {
   const cv::Mat reference = texturedPicture(8);
   const cv::Mat current = disturbed(warpedPicture(reference, exampleHomography(), SIZE), 1.0, 0.0, 3.0);
-  const ViewMatcher matcher{ ViewMatcherParams() };
+  const PointViewMatcher matcher{ PointViewMatcherParams() };
   const PreparedImage a(reference, cv::Rect(), matcher.params().points);
   const PreparedImage b(current, cv::Rect(), matcher.params().points);
   const ViewMatch tight = matcher.match(a, b, GeometryModel::HOMOGRAPHY, 0.5);
@@ -345,10 +345,10 @@ TEST(ViewMatcher, TakesTheThresholdOfTheCall)
                std::invalid_argument);
 }
 
-TEST(ViewMatcherParams, NameTheFaultsOfAllPartsAtOnce)
+TEST(PointViewMatcherParams, NameTheFaultsOfAllPartsAtOnce)
 {
-  EXPECT_TRUE(ViewMatcherParams().validate().empty());
-  ViewMatcherParams params;
+  EXPECT_TRUE(PointViewMatcherParams().validate().empty());
+  PointViewMatcherParams params;
   params.points.corners.max_corners = 0;
   params.ransac.max_iterations = 0;
   params.consistency.threshold = 0.0;
@@ -356,7 +356,7 @@ TEST(ViewMatcherParams, NameTheFaultsOfAllPartsAtOnce)
   params.min_log_significance = -1.0;
   params.first_share = 0.0;
   EXPECT_EQ(params.validate().size(), 6U);
-  EXPECT_THROW(ViewMatcher{ params }, std::invalid_argument);
+  EXPECT_THROW(PointViewMatcher{ params }, std::invalid_argument);
 }
 
 }  // namespace

@@ -4,7 +4,7 @@
 
 #include "view_servo/control/homing.h"
 #include "view_servo/control/velocity_limiter.h"
-#include "view_servo/views/parameter.h"
+#include "view_servo/parameters/parameter.h"
 
 #include <vector>
 

@@ -60,7 +60,7 @@ private:
  * Reads the options of matching by points (views/matcher_parameters.h) and validates them.
  * @param ns sub-namespace of the node that they are in; empty: none.
  */
-ViewMatcherParams readMatcherParams(ParameterReader& reader, const std::string& ns = "");
+PointViewMatcherParams readMatcherParams(ParameterReader& reader, const std::string& ns = "");
 
 /** Likewise, of matching by lines. */
 LineMatcherParams readLineMatcherParams(ParameterReader& reader);

@@ -37,7 +37,7 @@ struct SessionStarterParams
  *  - `~views_dir` (string, default "" = $ROS_HOME/view_servo/views): where stored views are;
  *  - `~odom_frame` (string, default "base_link"): frame that does not jump, which tf knows the camera's frame in; "": none;
  *  - `~tf_patience` (double, default 0.05 [s], >= 0): time that an image waits for tf;
- *  - those of tracking, see homographyTrackerParameters().
+ *  - those of tracking, see planeTrackerParameters().
  */
 class SessionStarter
 {

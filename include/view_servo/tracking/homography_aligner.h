@@ -14,7 +14,7 @@
 namespace view_servo
 {
 /** Options of the homography tracker. */
-struct HomographyTrackerParams
+struct HomographyAlignerParams
 {
   int max_points = 200;          ///< corners of the stored view that are looked for, >= 12
   int patch_radius = 10;         ///< patches of (2 r + 1)² pixels are compared; on coarse levels smaller ones, 2 to 20
@@ -52,7 +52,7 @@ struct TrackedHomography
  *
  * Stateless but for what it knows of the stored view; the caller predicts, from odometry or from the motion before.
  */
-class HomographyTracker
+class HomographyAligner
 {
 public:
   /**
@@ -60,7 +60,7 @@ public:
    * @throws std::invalid_argument with all faults of the parameters, or when the image has the wrong type, the region
    * leaves it, or it has too few corners.
    */
-  HomographyTracker(const cv::Mat& reference, const cv::Rect& region, const HomographyTrackerParams& params);
+  HomographyAligner(const cv::Mat& reference, const cv::Rect& region, const HomographyAlignerParams& params);
 
   /**
    * @param current 8-bit, one channel, of any size.
@@ -126,7 +126,7 @@ private:
   void makeBlocks(const cv::Mat& image, const cv::Rect& region);
   Eigen::Matrix3d refine(const cv::Mat& current, const Eigen::Matrix3d& h) const;
 
-  HomographyTrackerParams params_;
+  HomographyAlignerParams params_;
   std::vector<Eigen::Vector2d> points_;      // pixels of the full image
   std::vector<std::vector<Patch>> patches_;  // of levels, of points
   std::vector<Block> blocks_;                // side by side over the region

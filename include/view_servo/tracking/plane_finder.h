@@ -4,7 +4,7 @@
 
 #include "view_servo/geometry/correspondence.h"
 #include "view_servo/views/prepared_image.h"
-#include "view_servo/views/view_matcher.h"
+#include "view_servo/views/point_view_matcher.h"
 
 #include <Eigen/Core>
 #include <opencv2/core/mat.hpp>
@@ -39,7 +39,7 @@ public:
   };
 
   /** @throws std::invalid_argument with all faults of the parameters. */
-  explicit PlaneFinder(const ViewMatcherParams& params);
+  explicit PlaneFinder(const PointViewMatcherParams& params);
 
   FeatureParams features() const
   {
@@ -47,7 +47,7 @@ public:
   }
 
   /**
-   * @param given_up as in ViewMatcher::match(); once it holds, nothing is found.
+   * @param given_up as in PointViewMatcher::match(); once it holds, nothing is found.
    * @throws std::invalid_argument when the image has the wrong type.
    */
   Answer find(const Question& question, const std::function<bool()>& given_up = {}) const;
@@ -55,7 +55,7 @@ public:
 private:
   ViewMatch match(const PreparedImage& view, const cv::Mat& image, const std::function<bool()>& given_up) const;
 
-  ViewMatcher matcher_;
+  PointViewMatcher matcher_;
 };
 
 }  // namespace view_servo

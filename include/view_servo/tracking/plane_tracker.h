@@ -2,7 +2,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-#include "view_servo/tracking/homography_tracker.h"
+#include "view_servo/tracking/homography_aligner.h"
 #include "view_servo/tracking/plane_filter.h"
 
 #include <Eigen/Core>
@@ -19,7 +19,7 @@ namespace view_servo
 /** Options of following a plane from image to image. */
 struct PlaneTrackerParams
 {
-  HomographyTrackerParams tracker;
+  HomographyAlignerParams tracker;
   PlaneFilterParams filter;
   int lost_after = 5;  ///< images in a row without the plane, >= 1
 
@@ -56,7 +56,7 @@ class PlaneTracker
 public:
   /**
    * @param k camera matrix of the stored view and of all images, without distortion [px].
-   * @throws what HomographyTracker throws, std::invalid_argument with all faults of the parameters.
+   * @throws what HomographyAligner throws, std::invalid_argument with all faults of the parameters.
    */
   PlaneTracker(const cv::Mat& reference, const cv::Rect& region, const Eigen::Matrix3d& k,
                const PlaneTrackerParams& params);
@@ -99,7 +99,7 @@ private:
 
   PlaneTrackerParams params_;
   Eigen::Matrix3d k_;
-  HomographyTracker tracker_;
+  HomographyAligner tracker_;
   PlaneFilter filter_;
   std::optional<Place> last_;
   bool found_once_ = false;

@@ -3,7 +3,7 @@
 #pragma once
 
 #include "view_servo/geometry/correspondence.h"
-#include "view_servo/views/view_matcher.h"
+#include "view_servo/views/point_view_matcher.h"
 
 #include <Eigen/Core>
 #include <opencv2/core/mat.hpp>

@@ -44,7 +44,7 @@ enum class GeometryEstimator
 };
 
 /** Options of the whole way from two images to their geometry. */
-struct ViewMatcherParams
+struct PointViewMatcherParams
 {
   PointMatcherParams points;
   RansacParams ransac;
@@ -118,13 +118,13 @@ struct ViewMatch
 };
 
 /** Matches two views of a scene by intensity profiles. Stateless between calls: the same input gives the same result. */
-class ViewMatcher
+class PointViewMatcher
 {
 public:
   /** @throws std::invalid_argument with all faults of the parameters. */
-  explicit ViewMatcher(const ViewMatcherParams& params);
+  explicit PointViewMatcher(const PointViewMatcherParams& params);
 
-  const ViewMatcherParams& params() const
+  const PointViewMatcherParams& params() const
   {
     return params_;
   }
@@ -138,7 +138,7 @@ public:
                   double inlier_threshold = 0.0, const std::function<bool()>& given_up = {}) const;
 
 private:
-  ViewMatcherParams params_;
+  PointViewMatcherParams params_;
 };
 
 }  // namespace view_servo
