@@ -15,9 +15,15 @@ function(configure_target target)
 endfunction()
 
 # precompile(TARGET HEADER...): what nearly all of a target's files include is compiled once.
-function(precompile target)
-  if(NOT CMAKE_VERSION VERSION_LESS 3.16)
-    target_precompile_headers(${target} PRIVATE ${ARGN})
+# precompile(TARGET REUSE_FROM OTHER): once for both.
+function(precompile target first)
+  if(CMAKE_VERSION VERSION_LESS 3.16)
+    return()
+  endif()
+  if(first STREQUAL "REUSE_FROM")
+    target_precompile_headers(${target} REUSE_FROM ${ARGN})
+  else()
+    target_precompile_headers(${target} PRIVATE ${first} ${ARGN})
   endif()
 endfunction()
 

@@ -6,7 +6,6 @@
 #include "residuals.h"
 #include "view_servo/geometry/fundamental.h"
 
-#include <Eigen/SVD>
 #include <opencv2/calib3d.hpp>
 #include <opencv2/core/eigen.hpp>
 
@@ -130,9 +129,9 @@ std::vector<Eigen::Matrix3d> essentialFromFivePoints(const Correspondences& five
 
 std::vector<RelativePose> posesFromEssential(const Eigen::Matrix3d& essential)
 {
-  const Eigen::JacobiSVD<Eigen::Matrix3d> svd(essential, Eigen::ComputeFullU | Eigen::ComputeFullV);
-  Eigen::Matrix3d u = svd.matrixU();
-  Eigen::Matrix3d v = svd.matrixV();
+  Svd3 svd = singularValues(essential);
+  Eigen::Matrix3d& u = svd.u;
+  Eigen::Matrix3d& v = svd.v;
   u *= u.determinant() < 0.0 ? -1.0 : 1.0;
   v *= v.determinant() < 0.0 ? -1.0 : 1.0;
   Eigen::Matrix3d quarter_turn;

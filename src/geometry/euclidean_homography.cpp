@@ -2,9 +2,10 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "view_servo/geometry/euclidean_homography.h"
 
+#include "decompositions.h"
+
 #include <Eigen/Geometry>
 #include <Eigen/LU>
-#include <Eigen/SVD>
 #include <opencv2/calib3d.hpp>
 #include <opencv2/core.hpp>
 #include <opencv2/core/eigen.hpp>
@@ -17,16 +18,16 @@ namespace view_servo
 {
 Eigen::Matrix3d nearestRotation(const Eigen::Matrix3d& matrix)
 {
-  const Eigen::JacobiSVD<Eigen::Matrix3d> svd(matrix, Eigen::ComputeFullU | Eigen::ComputeFullV);
+  const Svd3 svd = singularValues(matrix);
   Eigen::Matrix3d signs = Eigen::Matrix3d::Identity();
-  signs(2, 2) = (svd.matrixU() * svd.matrixV().transpose()).determinant();
-  return svd.matrixU() * signs * svd.matrixV().transpose();
+  signs(2, 2) = (svd.u * svd.v.transpose()).determinant();
+  return svd.u * signs * svd.v.transpose();
 }
 
 Eigen::Matrix3d calibratedHomography(const Eigen::Matrix3d& h, const Eigen::Matrix3d& k, const Points& seen)
 {
   Eigen::Matrix3d result = k.inverse() * h * k;
-  result /= Eigen::JacobiSVD<Eigen::Matrix3d>(result).singularValues()(1);
+  result /= singularValues(result).values(1);
   int ahead = 0;
   for (const Eigen::Vector2d& point : seen)
   {
@@ -64,10 +65,10 @@ std::vector<EuclideanHomography> decomposeHomography(const Eigen::Matrix3d& h, c
   {
     return result;  // seen from behind
   }
-  const Eigen::JacobiSVD<Eigen::Matrix3d> svd(normalized, Eigen::ComputeFullU | Eigen::ComputeFullV);
-  if (svd.singularValues()(0) - svd.singularValues()(2) < ONLY_TURNED)
+  const Svd3 svd = singularValues(normalized);
+  if (svd.values(0) - svd.values(2) < ONLY_TURNED)
   {
-    result.push_back({ svd.matrixU() * svd.matrixV().transpose(), Eigen::Vector3d::Zero(),
+    result.push_back({ svd.u * svd.v.transpose(), Eigen::Vector3d::Zero(),
                        Eigen::Vector3d::Constant(std::numeric_limits<double>::quiet_NaN()) });
     return result;
   }

@@ -6,10 +6,8 @@
 #include "normalization.h"
 #include "residuals.h"
 
-#include <Eigen/Eigenvalues>
 #include <Eigen/Geometry>
 #include <Eigen/QR>
-#include <Eigen/SVD>
 
 #include <algorithm>
 #include <array>
@@ -244,16 +242,14 @@ std::optional<Eigen::Matrix3d> fundamentalFromPoints(const Correspondences& pair
     const Eigen::Vector3d current = normalized.current.homogeneous();
     addKronecker(current * current.transpose(), reference * reference.transpose(), ata);
   }
-  const Eigen::SelfAdjointEigenSolver<Matrix9d> eigen(ata);
-  if (eigen.info() != Eigen::Success || !(eigen.eigenvalues()(1) > RANK_TOLERANCE * eigen.eigenvalues()(8)))
+  const SymmetricEigen eigen = symmetricEigen(ata);
+  if (!(eigen.values(1) > RANK_TOLERANCE * eigen.values(8)))
   {
     return std::nullopt;
   }
-  const Eigen::JacobiSVD<Eigen::Matrix3d> svd(matrixFromRows(eigen.eigenvectors().col(0)),
-                                              Eigen::ComputeFullU | Eigen::ComputeFullV);
-  Eigen::Vector3d singular_values = svd.singularValues();
-  singular_values.z() = 0.0;
-  return denormalized(svd.matrixU() * singular_values.asDiagonal() * svd.matrixV().transpose(), *normalization);
+  Svd3 svd = singularValues(matrixFromRows(eigen.vectors.col(0)));
+  svd.values.z() = 0.0;
+  return denormalized(svd.u * svd.values.asDiagonal() * svd.v.transpose(), *normalization);
 }
 
 Eigen::Matrix3d refineFundamental(const Eigen::Matrix3d& initial, const Correspondences& pairs, double huber_width,

@@ -6,7 +6,6 @@
 #include "normalization.h"
 #include "residuals.h"
 
-#include <Eigen/Eigenvalues>
 #include <Eigen/Geometry>
 #include <Eigen/LU>
 
@@ -174,12 +173,12 @@ std::optional<Eigen::Matrix3d> homographyFromPoints(const Correspondences& pairs
     const Eigen::Vector3d x = reference.homogeneous();
     addKronecker(m, x * x.transpose(), ata);
   }
-  const Eigen::SelfAdjointEigenSolver<Matrix9d> eigen(ata);
-  if (eigen.info() != Eigen::Success || !(eigen.eigenvalues()(1) > RANK_TOLERANCE * eigen.eigenvalues()(8)))
+  const SymmetricEigen eigen = symmetricEigen(ata);
+  if (!(eigen.values(1) > RANK_TOLERANCE * eigen.values(8)))
   {
     return std::nullopt;
   }
-  const Eigen::Matrix3d normalized = matrixFromRows(eigen.eigenvectors().col(0));
+  const Eigen::Matrix3d normalized = matrixFromRows(eigen.vectors.col(0));
   if (!(std::abs(normalized.determinant()) > RANK_TOLERANCE))
   {
     return std::nullopt;

@@ -2,7 +2,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-#include <Eigen/Cholesky>
+#include "decompositions.h"
+
 #include <Eigen/Core>
 
 #include <algorithm>
@@ -55,7 +56,7 @@ bool levenbergMarquardt(const Problem& problem, typename Problem::State& state, 
     {
       Matrix damped = jtj;
       damped.diagonal() *= 1.0 + damping;
-      const Vector step = -damped.ldlt().solve(gradient);
+      const Vector step = -solveSymmetric(damped, gradient);
       const typename Problem::State candidate = problem.moved(state, step);
       const double candidate_cost = problem.cost(candidate);
       if (candidate_cost < cost)

@@ -2,8 +2,10 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "view_servo/geometry/line_homography.h"
 
+#include "decompositions.h"
+
 #include <Eigen/Cholesky>
-#include <Eigen/Eigenvalues>
+#include <Eigen/Geometry>
 #include <Eigen/LU>
 
 #include <algorithm>
@@ -15,7 +17,6 @@ namespace view_servo
 namespace
 {
 using Row = Eigen::Matrix<double, 1, 9>;
-using NormalMatrix = Eigen::Matrix<double, 9, 9>;
 
 /** Similarity that moves the midpoints' mean to the origin and scales the segments' mean extent to about sqrt(2). */
 template <typename Member>
@@ -39,9 +40,9 @@ Eigen::Matrix3d normalization(const SegmentPairs& pairs, Member member)
 }
 
 /** Sum over all end points of rowᵀ row, where row · vec(H) = l_curᵀ H x_ref (H row by row, normalised coordinates). */
-NormalMatrix normalMatrix(const SegmentPairs& pairs, const Eigen::Matrix3d& from, const Eigen::Matrix3d& to)
+Matrix9d normalMatrix(const SegmentPairs& pairs, const Eigen::Matrix3d& from, const Eigen::Matrix3d& to)
 {
-  NormalMatrix sum = NormalMatrix::Zero();
+  Matrix9d sum = Matrix9d::Zero();
   for (const SegmentPair& pair : pairs)
   {
     const Eigen::Vector2d normal = pair.current.normal();
@@ -56,11 +57,6 @@ NormalMatrix normalMatrix(const SegmentPairs& pairs, const Eigen::Matrix3d& from
     }
   }
   return sum.selfadjointView<Eigen::Upper>();
-}
-
-Eigen::Matrix3d fromRows(const Eigen::Matrix<double, 9, 1>& values)
-{
-  return Eigen::Map<const Eigen::Matrix<double, 3, 3, Eigen::RowMajor>>(values.data());
 }
 
 /** Undoes the normalisation; third coordinate 1 at its origin, the mean of the reference. */
@@ -83,12 +79,12 @@ std::optional<Eigen::Matrix3d> homographyFromLines(const SegmentPairs& pairs)
   }
   const Eigen::Matrix3d from = normalization(pairs, &SegmentPair::reference);
   const Eigen::Matrix3d to = normalization(pairs, &SegmentPair::current);
-  const Eigen::SelfAdjointEigenSolver<NormalMatrix> solver(normalMatrix(pairs, from, to));
-  if (!(solver.eigenvalues()(1) > RANK_TOLERANCE * solver.eigenvalues()(8)))
+  const SymmetricEigen eigen = symmetricEigen(normalMatrix(pairs, from, to));
+  if (!(eigen.values(1) > RANK_TOLERANCE * eigen.values(8)))
   {
     return std::nullopt;
   }
-  return denormalized(fromRows(solver.eigenvectors().col(0)), from, to);
+  return denormalized(matrixFromRows(eigen.vectors.col(0)), from, to);
 }
 
 std::optional<Eigen::Matrix3d> affinityFromLines(const SegmentPairs& pairs)
@@ -99,7 +95,7 @@ std::optional<Eigen::Matrix3d> affinityFromLines(const SegmentPairs& pairs)
   }
   const Eigen::Matrix3d from = normalization(pairs, &SegmentPair::reference);
   const Eigen::Matrix3d to = normalization(pairs, &SegmentPair::current);
-  const NormalMatrix sum = normalMatrix(pairs, from, to);
+  const Matrix9d sum = normalMatrix(pairs, from, to);
   const Eigen::LDLT<Eigen::Matrix<double, 6, 6>> factors(sum.topLeftCorner<6, 6>());
   if (!(factors.vectorD().minCoeff() > RANK_TOLERANCE * factors.vectorD().maxCoeff()))
   {
@@ -107,7 +103,7 @@ std::optional<Eigen::Matrix3d> affinityFromLines(const SegmentPairs& pairs)
   }
   Eigen::Matrix<double, 9, 1> values;
   values << factors.solve(-sum.topRightCorner<6, 1>()), 0.0, 0.0, 1.0;
-  return denormalized(fromRows(values), from, to);
+  return denormalized(matrixFromRows(values), from, to);
 }
 
 std::optional<Segment> transfer(const Eigen::Matrix3d& h, const Segment& segment)

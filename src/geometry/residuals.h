@@ -5,12 +5,12 @@
 #include "view_servo/geometry/correspondence.h"
 #include "view_servo/geometry/essential.h"
 
+#include "decompositions.h"
 #include "normalization.h"
 
 #include <Eigen/Core>
 #include <Eigen/Geometry>
 #include <Eigen/LU>
-#include <Eigen/SVD>
 
 #include <cmath>
 
@@ -106,13 +106,13 @@ struct Orthonormal
 
   explicit Orthonormal(const Eigen::Matrix3d& f)
   {
-    const Eigen::JacobiSVD<Eigen::Matrix3d> svd(f, Eigen::ComputeFullU | Eigen::ComputeFullV);
-    u = svd.matrixU();
-    v = svd.matrixV();
+    const Svd3 svd = singularValues(f);
+    u = svd.u;
+    v = svd.v;
     // The third columns meet the zero singular value: their signs are free.
     u.col(2) *= u.determinant() < 0.0 ? -1.0 : 1.0;
     v.col(2) *= v.determinant() < 0.0 ? -1.0 : 1.0;
-    p = std::atan2(svd.singularValues()(1), svd.singularValues()(0));
+    p = std::atan2(svd.values(1), svd.values(0));
   }
 
   Eigen::Matrix3d matrix() const

@@ -1,0 +1,35 @@
+// Copyright (c) 2026, the view_servo authors
+// SPDX-License-Identifier: BSD-3-Clause
+#include "decompositions.h"
+
+#include <Eigen/Eigenvalues>
+#include <Eigen/SVD>
+
+#include <limits>
+
+namespace view_servo
+{
+SymmetricEigen symmetricEigen(const Matrix9d& matrix)
+{
+  const Eigen::SelfAdjointEigenSolver<Matrix9d> solver(matrix);
+  if (solver.info() != Eigen::Success)
+  {
+    constexpr double NOT_A_NUMBER = std::numeric_limits<double>::quiet_NaN();
+    return { Vector9d::Constant(NOT_A_NUMBER), Matrix9d::Constant(NOT_A_NUMBER) };
+  }
+  return { solver.eigenvalues(), solver.eigenvectors() };
+}
+
+Svd3 singularValues(const Eigen::Matrix3d& matrix)
+{
+  const Eigen::JacobiSVD<Eigen::Matrix3d> svd(matrix, Eigen::ComputeFullU | Eigen::ComputeFullV);
+  return { svd.matrixU(), svd.singularValues(), svd.matrixV() };
+}
+
+template Eigen::Matrix<double, 2, 1> solveSymmetric(const Eigen::Matrix<double, 2, 2>&, const Eigen::Matrix<double, 2, 1>&);
+template Eigen::Matrix<double, 3, 1> solveSymmetric(const Eigen::Matrix<double, 3, 3>&, const Eigen::Matrix<double, 3, 1>&);
+template Eigen::Matrix<double, 5, 1> solveSymmetric(const Eigen::Matrix<double, 5, 5>&, const Eigen::Matrix<double, 5, 1>&);
+template Eigen::Matrix<double, 7, 1> solveSymmetric(const Eigen::Matrix<double, 7, 7>&, const Eigen::Matrix<double, 7, 1>&);
+template Eigen::Matrix<double, 9, 1> solveSymmetric(const Eigen::Matrix<double, 9, 9>&, const Eigen::Matrix<double, 9, 1>&);
+
+}  // namespace view_servo
