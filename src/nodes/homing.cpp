@@ -10,6 +10,7 @@
 #include "view_servo/ros/conversions.h"
 #include "view_servo/ros/driver_node.h"
 #include "view_servo/ros/homing_worker.h"
+#include "view_servo/ros/image_source.h"
 #include "view_servo/ros/transform_source.h"
 #include "view_servo/ros/view_answer.h"
 #include "view_servo/views/view_store.h"
@@ -30,17 +31,7 @@ namespace view_servo
 {
 
 /**
- * Drives a holonomic mobile base back to where a view was stored. Parameters, all private; config/homing.yaml has them
- * with their ranges:
- *  - those of every driver, see DriverNode;
- *  - `~view` (string, default ""): stored view whose direction is estimated while there is no goal, and which a goal
- *    without a name means;
- *  - `~views_dir` (string): as in view_store;
- *  - `~base_frame` (string, default "base_link"), which tf must know the camera's frame in;
- *  - `~image_timeout`, `~odometry_timeout`, `~match_timeout` (double, default 0.25 [s]): without input for so long, by a
- *    steady clock, the base stands still until there is some again;
- *  - `~image_transport`, `~queue_size`, `~max_image_age`: see CameraInput;
- *  - those of homing and of the base's limits, see homingParameters().
+ * Drives a holonomic mobile base back to where a view was stored. Private parameters: see HomingDriverParams.
  *
  * Subscribes:
  *  - `image_raw`, `camera_info`: see CameraInput;
@@ -80,7 +71,7 @@ public:
                                 params.match_timeout)),
       points_("matches", context.resolved("point_matches")),
       lines_("matches", context.resolved("line_matches")),
-      store_(params.views_dir),
+      store_(viewsDir(params.views_dir)),
       output_(context.nodeHandle(), context.commandTopic(), params.base_frame),
       worker_(
           context.resolved("image_raw"),

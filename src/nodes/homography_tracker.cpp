@@ -5,6 +5,7 @@
 #include "view_servo/ros/camera_input.h"
 #include "view_servo/ros/conversions.h"
 #include "view_servo/ros/node_base.h"
+#include "view_servo/ros/node_params.h"
 #include "view_servo/ros/parameters.h"
 #include "view_servo/ros/plane_searcher.h"
 #include "view_servo/ros/plane_session.h"
@@ -41,30 +42,17 @@ namespace
 {
 using Clock = std::chrono::steady_clock;
 
-struct Params
+/** Those of matching have a sub-namespace, as patch_radius and others mean something else in tracking. */
+HomographyTrackerNodeParams readTrackerParams(const ros::NodeHandle& private_nh)
 {
-  CameraInputParams camera;
-  SessionStarterParams sessions;
-  std::string view;
-  double match_period = 0.3;
-  PointViewMatcherParams matching;
-
-  static Params read(const ros::NodeHandle& private_nh)
-  {
-    Params params;
-    ParameterReader reader(private_nh);
-    params.camera = CameraInputParams::read(reader);
-    params.sessions = SessionStarterParams::read(reader);
-    reader.read("view", params.view);
-    reader.require(params.view.empty() || isValidViewName(params.view),
-                   "~view: '" + params.view + "' is not a view's name");
-    reader.read("match_period", params.match_period);
-    reader.require(params.match_period > 0.0, "~match_period must be more than 0 s");
-    params.matching = readMatcherParams(reader, "matching");
-    reader.finish();
-    return params;
-  }
-};
+  HomographyTrackerNodeParams params;
+  ParameterReader reader(private_nh);
+  reader.read(parameters(params));
+  reader.read(parameters(params.matching), "matching");
+  reader.addFaults(params.validate());
+  reader.finish();
+  return params;
+}
 
 /** What is to be followed. */
 struct Task
@@ -90,12 +78,7 @@ std::string nameOf(TrackingState state)
 
 /**
  * Follows the plane of a stored view through the images of a moving camera, and publishes its homography, the camera's motion
- * from the view and the plane itself. Parameters, all private; config/homography_tracker.yaml has them with their ranges:
- *  - `~view` (string, default ""): stored view that is followed from the start;
- *  - `~views_dir`, `~odom_frame`, `~tf_patience` and those of tracking: see SessionStarter;
- *  - `~match_period` (double, default 0.3 [s]): from one search for the view to the next;
- *  - `~matching/...`: how the view is found, see matcherParameters();
- *  - `~image_transport`, `~queue_size`, `~max_image_age`: see CameraInput.
+ * from the view and the plane itself. Private parameters: see HomographyTrackerNodeParams.
  *
  * Subscribes:
  *  - `image_raw`, `camera_info`: see CameraInput; tf;
@@ -124,7 +107,7 @@ class HomographyTrackerNode : private NodeBase
 public:
   HomographyTrackerNode(const ros::NodeHandle& nh, const ros::NodeHandle& private_nh)
     : NodeBase(nh, private_nh),
-      params_(Params::read(private_nh)),
+      params_(readTrackerParams(private_nh)),
       finder_(params_.matching),
       searcher_(finder_, params_.match_period),
       camera_(nh, params_.camera, [this](const CameraFrame& frame) { onFrame(frame); }),
@@ -435,7 +418,7 @@ private:
   static constexpr std::chrono::seconds NO_IMAGE_AFTER{ 2 };
   static constexpr const char* LOOKS_FOR_IT = "looks for the view";
 
-  const Params params_;
+  const HomographyTrackerNodeParams params_;
   const PlaneFinder finder_;
 
   std::mutex mutex_;  // guards what follows; never held while an image is worked on or a view is read

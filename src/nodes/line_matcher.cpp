@@ -46,11 +46,6 @@ public:
   static constexpr const char* TOPIC = "line_matches";
   static constexpr double RATE = 10.0;  // [Hz]
 
-  static Params readParams(ParameterReader& reader)
-  {
-    return readLineMatcherParams(reader);
-  }
-
   explicit LineMatching(const Params& params) : matcher_(params)
   {
   }
@@ -114,7 +109,7 @@ private:
  * Parameters, all private; config/line_matcher.yaml has them with their ranges:
  *  - `~view`, `~rate` (default 10.0 [Hz]), `~views_dir`, `~allow_paths`, `~image_patience`, `~image_transport`, `~queue_size`,
  *    `~max_image_age`: see StreamingMatcher;
- *  - those of the matcher, see matcherParameters().
+ *  - those of the matcher, see parameters(LineMatcherParams&).
  *
  * Subscribes:
  *  - `image_raw` (sensor_msgs/Image), `camera_info` (sensor_msgs/CameraInfo);

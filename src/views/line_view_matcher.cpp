@@ -3,10 +3,10 @@
 #include "view_servo/views/line_view_matcher.h"
 
 #include "stage_clock.h"
-#include "view_servo/parameters/faults.h"
 #include "view_servo/geometry/fundamental.h"
 #include "view_servo/geometry/homography.h"
 #include "view_servo/geometry/line_homography.h"
+#include "view_servo/parameters/faults.h"
 #include "view_servo/robust/fundamental_estimator.h"
 #include "view_servo/robust/line_homography_estimator.h"
 
@@ -498,6 +498,18 @@ std::string whyNot(const LineFeatures& reference, const LineFeatures& current, c
          " open";
 }
 
+/** The parameters that no stage of line matching has by itself. */
+std::vector<Parameter> rowsOfLines(LineMatcherParams& params)
+{
+  return {
+    real("plane_threshold", params.plane_threshold, "px", "> 0", "largest error of a line on a plane, across"),
+    integer("min_plane_lines", params.min_plane_lines, "", ">= 5", "lines that make a plane"),
+    integer("max_planes", params.max_planes, "", ">= 1", "planes looked for"),
+    real("min_quality", params.min_quality, "", "[0, 1)", "least mean of a match's overlap and correlation"),
+    natural("seed", params.seed, "of all random draws"),
+  };
+}
+
 }  // namespace
 
 LineMatcherParams::LineMatcherParams()
@@ -506,31 +518,22 @@ LineMatcherParams::LineMatcherParams()
   ransac.inlier_threshold = 3.0;
 }
 
+std::vector<Parameter> parameters(LineMatcherParams& params)
+{
+  return joined({ parameters(params.segments), parameters(params.features), parameters(params.regions),
+                  rowsOfLines(params), parameters(params.ransac) });
+}
+
 std::vector<std::string> LineMatcherParams::validate() const
 {
-  std::vector<std::string> faults;
-  for (const std::vector<std::string>& more :
-       { segments.validate(), features.validate(), regions.validate(), ransac.validate() })
-  {
-    faults.insert(faults.end(), more.begin(), more.end());
-  }
-  if (!(plane_threshold > 0.0))
-  {
-    faults.emplace_back("plane_threshold must be more than 0 px");
-  }
-  if (min_plane_lines < 5)
-  {
-    faults.emplace_back("min_plane_lines must be at least 5");
-  }
-  if (max_planes < 1)
-  {
-    faults.emplace_back("max_planes must be at least 1");
-  }
-  if (!(min_quality >= 0.0 && min_quality < 1.0))
-  {
-    faults.emplace_back("min_quality must lie in [0, 1)");
-  }
-  return faults;
+  LineMatcherParams copy = *this;
+  Faults faults;
+  faults.add(segments.validate());
+  faults.add(features.validate());
+  faults.add(regions.validate());
+  faults.add(faultsOf(rowsOfLines(copy)));
+  faults.add(ransac.validate());
+  return faults.list();
 }
 
 LineViewMatcher::LineViewMatcher(const LineMatcherParams& params) : params_(params)

@@ -3,9 +3,9 @@
 #include "view_servo/views/point_view_matcher.h"
 
 #include "stage_clock.h"
-#include "view_servo/parameters/faults.h"
 #include "view_servo/geometry/fundamental.h"
 #include "view_servo/geometry/homography.h"
+#include "view_servo/parameters/faults.h"
 #include "view_servo/robust/fundamental_estimator.h"
 #include "view_servo/robust/homography_estimator.h"
 #include "view_servo/robust/significance.h"
@@ -485,25 +485,51 @@ private:
 
 }  // namespace
 
+std::vector<Parameter> parameters(PointViewMatcherParams& params)
+{
+  return joined({
+      parameters(params.points),
+      {
+          choice<Sampling>("sampling", params.ransac.sampling,
+                           { { "uniform", Sampling::UNIFORM }, { "progressive", Sampling::PROGRESSIVE } },
+                           "draw all candidates alike, or the best first (PROSAC)"),
+          choice<GeometryEstimator>("estimator", params.estimator,
+                                    { { "ransac", GeometryEstimator::RANSAC },
+                                      { "multi_hypothesis", GeometryEstimator::MULTI_HYPOTHESIS },
+                                      { "importance", GeometryEstimator::IMPORTANCE } },
+                                    "one candidate a point, or support from all associations (and samples, too)"),
+      },
+      parameters(params.hypotheses),
+      {
+          choice<ViewConsistency>("view_consistency", params.view_consistency,
+                                  { { "off", ViewConsistency::OFF },
+                                    { "before", ViewConsistency::BEFORE },
+                                    { "within", ViewConsistency::WITHIN } },
+                                  "where the constraint on five points is used"),
+      },
+      parameters(params.consistency),
+      {
+          boolean("guided", params.guided, "look for more matches along the geometry found"),
+      },
+      parameters(params.guidance),
+      {
+          real("first_share", params.first_share, "", "(0, 1]",
+               "part of the profiles that votes at first; all do if it is too little"),
+          boolean("scale_search", params.scale_search, "try other scales when the first finds no geometry"),
+          real("min_significance", params.min_log_significance, "", ">= 0",
+               "-log10 of the false alarms a geometry may have"),
+          natural("seed", params.seed, "of all random draws"),
+      },
+      parameters(params.ransac),
+  });
+}
+
 std::vector<std::string> PointViewMatcherParams::validate() const
 {
-  std::vector<std::string> faults;
-  for (const std::vector<std::string>& more :
-       { points.validate(), ransac.validate(), hypotheses.validate(), consistency.validate(), guidance.validate() })
-  {
-    faults.insert(faults.end(), more.begin(), more.end());
-  }
+  std::vector<std::string> faults = faultsOf(*this);
   if (view_consistency == ViewConsistency::BEFORE && estimator != GeometryEstimator::RANSAC)
   {
     faults.emplace_back("view_consistency before filters candidates, which only estimator ransac keeps to");
-  }
-  if (!(min_log_significance >= 0.0))
-  {
-    faults.emplace_back("min_significance must be at least 0");
-  }
-  if (!(first_share > 0.0 && first_share <= 1.0))
-  {
-    faults.emplace_back("first_share must lie in (0, 1]");
   }
   return faults;
 }
@@ -514,7 +540,7 @@ PointViewMatcher::PointViewMatcher(const PointViewMatcherParams& params) : param
 }
 
 ViewMatch PointViewMatcher::match(const PreparedImage& reference, const PreparedImage& current, GeometryModel model,
-                             double inlier_threshold, const std::function<bool()>& given_up) const
+                                  double inlier_threshold, const std::function<bool()>& given_up) const
 {
   if (!(inlier_threshold >= 0.0) || std::isinf(inlier_threshold))
   {

@@ -4,6 +4,7 @@
 
 #include "view_servo/geometry/correspondence.h"
 #include "view_servo/matching/association.h"
+#include "view_servo/parameters/parameter.h"
 #include "view_servo/robust/fundamental_estimator.h"
 #include "view_servo/robust/homography_estimator.h"
 #include "view_servo/robust/ransac.h"
@@ -35,6 +36,9 @@ struct MultiHypothesisParams
   /** All faults, one a line; empty when the parameters are usable. */
   std::vector<std::string> validate() const;
 };
+
+/** Names, units and ranges of these parameters, by which validate() checks them. */
+std::vector<Parameter> parameters(MultiHypothesisParams& params);
 
 template <typename Model>
 struct MultiHypothesisResult

@@ -2,6 +2,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include "view_servo/parameters/parameter.h"
 #include "view_servo/robust/consensus.h"
 #include "view_servo/robust/random.h"
 #include "view_servo/robust/sampler.h"
@@ -27,6 +28,9 @@ struct RansacParams
   /** All faults, one a line; empty when the parameters are usable. */
   std::vector<std::string> validate() const;
 };
+
+/** Names, units and ranges of these parameters, by which validate() checks them. */
+std::vector<Parameter> parameters(RansacParams& params);
 
 enum class RansacStop
 {

@@ -3,6 +3,7 @@
 #pragma once
 
 #include "view_servo/geometry/correspondence.h"
+#include "view_servo/parameters/parameter.h"
 #include "view_servo/robust/ransac.h"
 
 #include <array>
@@ -27,6 +28,9 @@ struct ViewConsistencyParams
   /** All faults, one a line; empty when the parameters are usable. */
   std::vector<std::string> validate() const;
 };
+
+/** Names, units and ranges of these parameters, by which validate() checks them. */
+std::vector<Parameter> parameters(ViewConsistencyParams& params);
 
 /**
  * Thesis 6.3, method 1: counts how often each candidate takes part in a view-consistent group of five drawn at random,

@@ -29,20 +29,19 @@ struct CameraFrame
 
 struct CameraInputParams
 {
+  std::string image_transport = "raw";  // read by image_transport itself
   int queue_size = 5;
-  double max_image_age = 1.0;
-
-  static CameraInputParams read(ParameterReader& reader);
+  double max_image_age = 1.0;  // [s]
 };
+
+/** Names, units, ranges and meanings of these parameters. */
+std::vector<Parameter> parameters(CameraInputParams& params);
 
 /**
  * A node's camera: the newest image that comes with a calibration of the same stamp.
  *
  * Subscribes to `image_raw` (sensor_msgs/Image) and `camera_info` (sensor_msgs/CameraInfo), each of which can be
- * remapped by itself. Parameters:
- *  - `~image_transport` (string, default "raw"): how images travel;
- *  - `~queue_size` (int, default 5, >= 1): images that wait for their camera_info, and the other way round;
- *  - `~max_image_age` (double, default 1.0 [s], > 0): an older image is not the camera's present view.
+ * remapped by itself.
  *
  * A frame that cannot be used (camera not calibrated, or calibrated for another size) is dropped, with a throttled
  * error that names both topics; so are messages of which none have a common stamp. An image from the future is as bad

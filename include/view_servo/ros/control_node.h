@@ -17,14 +17,15 @@
 namespace view_servo
 {
 /**
- * Whether a node may drive: off at start, switched by the service `~enable` (std_srvs/SetBool). With `~dry_run` (bool,
- * default false) commands go to other topics, whatever the gate says.
+ * Whether a node may drive: off at start, switched by the service `~enable` (std_srvs/SetBool). In a dry run
+ * commands go to other topics, whatever the gate says.
  */
 class CommandGate
 {
 public:
-  /** Reads `~dry_run`. */
-  explicit CommandGate(ParameterReader& reader);
+  explicit CommandGate(bool dry_run) : dry_run_(dry_run)
+  {
+  }
 
   std_srvs::SetBool::Response set(bool enabled);
 
@@ -43,7 +44,7 @@ public:
   }
 
 private:
-  bool dry_run_ = false;
+  bool dry_run_;
   std::atomic<bool> enabled_{ false };
 };
 

@@ -205,7 +205,7 @@ public:
   virtual void abort(std::string reason) = 0;
 
 protected:
-  DriverContext(const ros::NodeHandle& nh, const ros::NodeHandle& private_nh, ParameterReader& reader);
+  DriverContext(const ros::NodeHandle& nh, const ros::NodeHandle& private_nh, bool dry_run);
   ~DriverContext() = default;
 
   /** Whether the goal that is prepared is still wanted. The mutex is held. */

@@ -29,8 +29,7 @@ namespace view_servo
 {
 /**
  * A node that drives a robot to a stored view: goals, the gate, limits, commands, status and diagnostics. What is the robot's own
- * is `Driver`. Parameters, all private:
- *  - `~dry_run`: see CommandGate; `~timeout`, `~control_rate`, `~start_patience`: see DriverParams.
+ * is `Driver`. Private parameters that all drivers have: see DriverParams.
  *
  * Publishes `~wanted_view` (view_servo/WantedView, latched), which matchers and trackers follow: nothing that moves a robot waits
  * for the answer of a service. `status` (view_servo/ServoStatus, latched); `/diagnostics`.
@@ -42,8 +41,8 @@ namespace view_servo
  *
  * `Driver` has
  *  - `Action`, `Velocity`, `Limiter` (of Velocity), `Task` (a goal that is ready to begin) and `ACTION`, the action's name;
- *  - `Params`, with `DriverParams node`, `VelocityLimits limits`, `double lost_timeout` [s], after which a goal without an input
- *    ends, and `static Params read(ParameterReader&)`;
+ *  - `Params`, with their table parameters(Params&) and validate(), `DriverParams node`, `VelocityLimits limits`, and
+ *    `double patience() const`, the time [s] after which a goal without an input ends;
  *  - a constructor (DriverContext&, const Params&);
  *  - `std::unique_ptr<Task> prepare(const Goal&)`, without the mutex; may wait by DriverContext::require(); throws to refuse.
  *    The node itself waits for somebody who listens to the commands;
@@ -63,7 +62,7 @@ class DriverNode : public DriverContext
 {
 public:
   DriverNode(const ros::NodeHandle& nh, const ros::NodeHandle& private_nh)
-    : DriverNode(nh, private_nh, ParameterReader(private_nh))
+    : DriverNode(nh, private_nh, readParams<Params>(private_nh))
   {
   }
 
@@ -125,9 +124,9 @@ private:
     bool cancelled = false;
   };
 
-  DriverNode(const ros::NodeHandle& nh, const ros::NodeHandle& private_nh, ParameterReader reader)
-    : DriverContext(nh, private_nh, reader),
-      params_(readParams(reader)),
+  DriverNode(const ros::NodeHandle& nh, const ros::NodeHandle& private_nh, const Params& params)
+    : DriverContext(nh, private_nh, params.node.dry_run),
+      params_(params),
       limiter_(params_.limits),
       status_(nh_),
       server_(nh_, Driver::ACTION, false),
@@ -145,13 +144,6 @@ private:
     goal_thread_ = std::thread([this] { prepareGoals(); });
     control_timer_ =
         every(1.0 / params_.node.control_rate, "control", [this] { apply("a cycle of control", [this] { cycle(); }); });
-  }
-
-  static Params readParams(ParameterReader& reader)
-  {
-    Params params = Params::read(reader);
-    reader.finish();
-    return params;
   }
 
   void enable(const std_srvs::SetBool::Request& request, std_srvs::SetBool::Response& response)
@@ -375,7 +367,7 @@ private:
     circumstances.elapsed = std::chrono::duration<double>(Clock::now() - goal_->start).count();
     circumstances.timeout = goal_->timeout;
     circumstances.fault = jump;
-    circumstances.patience = params_.lost_timeout;
+    circumstances.patience = params_.patience();
     circumstances.missing_input = runs ? missingInput() : "";
     if (circumstances.missing_input.empty())
     {

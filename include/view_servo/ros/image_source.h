@@ -45,21 +45,30 @@ struct SourcedImage
   std::optional<ViewPose> pose;
 };
 
-/** `~views_dir` (string, default "" = $ROS_HOME/view_servo/views): where stored views are. */
-std::filesystem::path readViewsDir(ParameterReader& reader);
+/** The parameter `~views_dir`: where stored views are. */
+Parameter viewsDirParameter(std::filesystem::path& views_dir);
+
+/** The parameter `~view`, the name of a stored view. */
+Parameter viewParameter(std::string& view, std::string description);
+
+/** A fault unless `view` is empty or the name that a stored view can have. */
+std::vector<std::string> viewFaults(const std::string& view);
+
+/** The directory that an empty `~views_dir` stands for, or the one given. */
+std::filesystem::path viewsDir(const std::filesystem::path& views_dir);
 
 struct ImageSourceParams
 {
   std::filesystem::path views_dir;
   bool allow_paths = true;
-  double image_patience = 5.0;
-
-  static ImageSourceParams read(ParameterReader& reader);
+  double image_patience = 5.0;  // [s]
 };
+
+/** Names, units, ranges and meanings of these parameters. */
+std::vector<Parameter> parameters(ImageSourceParams& params);
 
 /**
  * Turns the ImageSource of a request into an image. Parameters:
- *  - `~views_dir` (string, default "" = $ROS_HOME/view_servo/views): where stored views are;
  *  - `~allow_paths` (bool, default true): whether requests may name files. They are read with the node's rights, so
  *    turn it off where requests come from strangers;
  *  - `~image_patience` (double, default 5.0 [s], >= 0): longest wait for the camera's image, when a request wants that and

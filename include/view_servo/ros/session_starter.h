@@ -18,6 +18,7 @@
 #include <memory>
 #include <optional>
 #include <string>
+#include <vector>
 
 namespace view_servo
 {
@@ -25,11 +26,12 @@ struct SessionStarterParams
 {
   std::filesystem::path views_dir;
   std::string odom_frame = "base_link";
-  double tf_patience = 0.05;
+  double tf_patience = 0.05;  // [s]
   PlaneTrackerParams tracker;
-
-  static SessionStarterParams read(ParameterReader& reader);
 };
+
+/** Names, units, ranges and meanings of these parameters. */
+std::vector<Parameter> parameters(SessionStarterParams& params);
 
 /**
  * Begins to follow views as soon as all is there that it takes: the stored view, images with a calibration, and tf.

@@ -11,9 +11,9 @@
 #include "view_servo/ros/parameters.h"
 #include "view_servo/ros/view_choice.h"
 #include "view_servo/views/overlay.h"
+#include "view_servo/views/point_view_matcher.h"
 #include "view_servo/views/prepared_image.h"
 #include "view_servo/views/view_cache.h"
-#include "view_servo/views/point_view_matcher.h"
 
 #include <diagnostic_msgs/DiagnosticStatus.h>
 #include <diagnostic_updater/DiagnosticStatusWrapper.h>
@@ -45,10 +45,14 @@ struct StreamingMatcherParams
   CameraInputParams camera;
   ImageSourceParams sources;
   std::string view;
-  double rate;
+  double rate = 5.0;  // [Hz]
 
-  static StreamingMatcherParams read(ParameterReader& reader, double default_rate);
+  /** All faults, one a line; empty when the parameters are usable. */
+  std::vector<std::string> validate() const;
 };
+
+/** Names, units, ranges and meanings of these parameters. */
+std::vector<Parameter> parameters(StreamingMatcherParams& params);
 
 /** What a message about a view says beside what was found. */
 struct MatchLabel
@@ -80,7 +84,8 @@ struct MatchLabel
  *  - `Service`, whose request has reference, query and overlay, whose response success, message, elapsed_ms and
  *    overlay; `Options`, what else a request may ask for, which by default is what camera images get; `Message`, which
  *    is published on `~TOPIC`; the default `RATE` [Hz];
- *  - `static Params readParams(ParameterReader&)`, a constructor that takes those, and `FeatureParams features() const`;
+ *  - `Params`, with their table parameters(Params&) and validate(), a constructor that takes those, and
+ *    `FeatureParams features() const`;
  *  - `static void clear(Service::Response&)`, which sets what a refused request leaves unknown;
  *  - `static Options options(const Service::Request&)`, which throws when the request makes no sense;
  *  - `ViewMatch match(const PreparedImage& reference, const PreparedImage& current, const Options&, given_up) const`, which ends
@@ -94,7 +99,7 @@ class StreamingMatcher : private NodeBase
 public:
   /** @throws std::invalid_argument listing all faults of the parameters. */
   StreamingMatcher(const ros::NodeHandle& nh, const ros::NodeHandle& private_nh)
-    : StreamingMatcher(nh, private_nh, Params::read(private_nh))
+    : StreamingMatcher(nh, private_nh, readParams(private_nh, defaults()))
   {
   }
 
@@ -116,14 +121,26 @@ private:
     StreamingMatcherParams node;
     typename Matching::Params matching;
 
-    static Params read(const ros::NodeHandle& private_nh)
+    std::vector<std::string> validate() const
     {
-      ParameterReader reader(private_nh);
-      Params params{ StreamingMatcherParams::read(reader, Matching::RATE), Matching::readParams(reader) };
-      reader.finish();
-      return params;
+      std::vector<std::string> faults = node.validate();
+      const std::vector<std::string> more = matching.validate();
+      faults.insert(faults.end(), more.begin(), more.end());
+      return faults;
+    }
+
+    friend std::vector<Parameter> parameters(Params& params)
+    {
+      return joined({ parameters(params.node), parameters(params.matching) });
     }
   };
+
+  static Params defaults()
+  {
+    Params params;
+    params.node.rate = Matching::RATE;
+    return params;
+  }
 
   /** What came of an image, for diagnostics. */
   struct Result

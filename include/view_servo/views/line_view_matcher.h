@@ -5,6 +5,7 @@
 #include "view_servo/features/line_segments.h"
 #include "view_servo/matching/line_features.h"
 #include "view_servo/matching/line_regions.h"
+#include "view_servo/parameters/parameter.h"
 #include "view_servo/robust/ransac.h"
 #include "view_servo/views/point_view_matcher.h"
 
@@ -32,6 +33,9 @@ struct LineMatcherParams
   /** All faults, one a line; empty when the parameters are usable. */
   std::vector<std::string> validate() const;
 };
+
+/** Names, units and ranges of these parameters, by which validate() checks them. */
+std::vector<Parameter> parameters(LineMatcherParams& params);
 
 /**
  * Matches the line segments of two views by the structure of their groups (thesis ch. 4), and what the image shows

@@ -6,6 +6,7 @@
 #include "view_servo/geometry/line_segment.h"
 #include "view_servo/matching/guided_matching.h"
 #include "view_servo/matching/point_matcher.h"
+#include "view_servo/parameters/parameter.h"
 #include "view_servo/robust/multi_hypothesis.h"
 #include "view_servo/robust/ransac.h"
 #include "view_servo/robust/view_consistency.h"
@@ -63,6 +64,9 @@ struct PointViewMatcherParams
   /** All faults, one a line; empty when the parameters are usable. */
   std::vector<std::string> validate() const;
 };
+
+/** Names, units and ranges of these parameters, by which validate() checks them. */
+std::vector<Parameter> parameters(PointViewMatcherParams& params);
 
 enum class MatchOutcome
 {
