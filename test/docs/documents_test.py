@@ -483,6 +483,8 @@ class Documented(unittest.TestCase):
             match = re.fullmatch(r"#include <view_servo/(\w+)\.h>", text)
             if match:
                 return self.type_exists(match.group(1))
+            if text.endswith("_test") and "vs_gtest(%s " % text[:-len("_test")] in sources:
+                return True
             if os.path.dirname(text) == "build":  # made by the build
                 return os.path.basename(text) in sources
             if text.rstrip("/") in self.path_ends():
