@@ -380,7 +380,8 @@ void listParameters(const std::string& subcommand)
   for (const Parameter& parameter : parameters(defaults))
   {
     std::cout << "  " << parameter.name << " (" << parameter.type << ", default " << parameter.get()
-              << "): " << parameter.description << '\n';
+              << (parameter.unit.empty() ? "" : " " + parameter.unit)
+              << (parameter.range.empty() ? "" : ", " + parameter.range) << "): " << parameter.description << '\n';
   }
 }
 
