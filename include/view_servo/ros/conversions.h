@@ -9,7 +9,7 @@
 #include "view_servo/geometry/camera.h"
 #include "view_servo/geometry/line_segment.h"
 #include "view_servo/tracking/plane_tracker.h"
-#include "view_servo/views/point_view_matcher.h"
+#include "view_servo/views/view_match.h"
 #include "view_servo/views/view_store.h"
 
 #include <geometry_msgs/PoseStamped.h>

@@ -13,7 +13,7 @@
 #include "view_servo/views/overlay.h"
 #include "view_servo/views/prepared_image.h"
 #include "view_servo/views/view_cache.h"
-#include "view_servo/views/point_view_matcher.h"
+#include "view_servo/views/view_match.h"
 
 #include <diagnostic_msgs/DiagnosticStatus.h>
 #include <diagnostic_updater/DiagnosticStatusWrapper.h>

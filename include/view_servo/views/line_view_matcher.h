@@ -6,7 +6,8 @@
 #include "view_servo/matching/line_features.h"
 #include "view_servo/matching/line_regions.h"
 #include "view_servo/robust/ransac.h"
-#include "view_servo/views/point_view_matcher.h"
+#include "view_servo/views/prepared_image.h"
+#include "view_servo/views/view_match.h"
 
 #include <cstdint>
 #include <string>

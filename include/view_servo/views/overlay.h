@@ -3,7 +3,8 @@
 #pragma once
 
 #include "view_servo/geometry/correspondence.h"
-#include "view_servo/views/point_view_matcher.h"
+#include "view_servo/views/prepared_image.h"
+#include "view_servo/views/view_match.h"
 
 #include <Eigen/Core>
 #include <opencv2/core/mat.hpp>
