@@ -184,9 +184,9 @@ std::vector<Parameter> matcherParameters(LineMatcherParams& params)
     real("min_correlation", regions.min_correlation,
          "least correlation of what lies beside two segments, on the better side, [-1, 1)"),
     real("min_mean_correlation", regions.min_mean_correlation, "least mean of it over a region's matches, [-1, 1)"),
-    real("plane_threshold", params.plane_threshold, "largest error of a line on a plane, across [px], > 0"),
-    integer("min_plane_lines", params.min_plane_lines, "lines that make a plane, >= 5"),
-    integer("max_planes", params.max_planes, "planes looked for, >= 1"),
+    real("plane_threshold", params.planes.threshold, "largest error of a line on a plane, across [px], > 0"),
+    integer("min_plane_lines", params.planes.min_lines, "lines that make a plane, >= 5"),
+    integer("max_planes", params.planes.max_planes, "planes looked for, >= 1"),
     real("min_quality", params.min_quality, "least mean of a match's overlap and correlation, [0, 1)"),
     natural("seed", params.seed, "of all random draws, >= 0"),
   };
