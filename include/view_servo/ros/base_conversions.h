@@ -7,7 +7,7 @@
 #include "view_servo/control/heading_vote.h"
 #include "view_servo/control/homing.h"
 #include "view_servo/control/velocity_limiter.h"
-#include "view_servo/geometry/planar_motion.h"
+#include "view_servo/geometry/planar_pose.h"
 
 #include <geometry_msgs/PoseStamped.h>
 #include <geometry_msgs/TwistStamped.h>
