@@ -54,7 +54,9 @@ struct CameraMount
   /** The inverse of level(). */
   Eigen::Vector2d unlevel(const Eigen::Vector2d& point) const;
 
-  /** Pose of the camera at one place in the camera at another -> of the base at the one place in the base at the other. */
+  /**
+   * Pose of the camera at one place in the camera at another -> of the base at the one place in the base at the other.
+   */
   PlanarPose ofBase(const PlanarPose& camera_in_camera) const;
   /** The inverse of ofBase(). */
   PlanarPose ofCamera(const PlanarPose& base_in_base) const;

@@ -42,7 +42,9 @@ struct LinePlanes
 LinePlanes findPlanes(const SegmentPairs& lines, const LinePlaneParams& params, const RansacParams& ransac_params,
                       Rng& rng);
 
-/** Whether the transfer error of a pair of points, RMS of the two images, is at most `threshold` [px] for some plane. */
+/**
+ * Whether the transfer error of a pair of points, RMS of the two images, is at most `threshold` [px] for some plane.
+ */
 bool liesOnPlane(const LinePlanes& planes, const Correspondence& point, double threshold);
 
 /**
@@ -55,7 +57,8 @@ std::optional<Eigen::Matrix3d> fundamentalOfPoints(const Correspondences& points
 
 /**
  * Fundamental matrix from the first two planes (thesis 4.7): the fit to the end points of their lines, each paired with
- * the point to which its plane's homography maps it. Empty when there are fewer than two planes, or they leave F undetermined.
+ * the point to which its plane's homography maps it. Empty when there are fewer than two planes, or they leave F
+ * undetermined.
  */
 std::optional<Eigen::Matrix3d> fundamentalOfPlanes(const SegmentPairs& lines, const LinePlanes& planes);
 

@@ -49,10 +49,10 @@ public:
   }
 
   /**
-   * In the result, `lines` are the matched segments, with their indices among those given to LineFeatures; `matches` are
-   * the intersections of matched neighbours; `planes` the homographies of planes; `fundamental` comes from the
-   * intersections or, where these do not determine it, from two planes. `matrix` is the homography of the first plane or
-   * the fundamental matrix, as `model` says.
+   * In the result, `lines` are the matched segments, with their indices among those given to LineFeatures; `matches`
+   * are the intersections of matched neighbours; `planes` the homographies of planes; `fundamental` comes from the
+   * intersections or, where these do not determine it, from two planes. `matrix` is the homography of the first plane
+   * or the fundamental matrix, as `model` says.
    *
    * Steps: groups vote for pairs of segments; from these grow regions of segments that agree with a local homography;
    * regions that contradict the epipolar geometry of all are dropped; planes are fitted to what remains.

@@ -2,8 +2,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-#include "view_servo/views/line_view_matcher.h"
 #include "view_servo/parameters/parameter.h"
+#include "view_servo/views/line_view_matcher.h"
 #include "view_servo/views/point_view_matcher.h"
 
 #include <string>

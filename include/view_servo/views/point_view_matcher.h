@@ -44,7 +44,9 @@ struct PointViewMatcherParams
   ViewConsistencyParams consistency;
   bool guided = true;  ///< look for more matches along the geometry found
   GuidedParams guidance;
-  /** The first attempt searches for this part of the profiles; unless its geometry is beyond doubt, all follow. (0, 1] */
+  /**
+   * The first attempt searches for this part of the profiles; unless its geometry is beyond doubt, all follow. (0, 1]
+   */
   double first_share = 0.6;
   bool scale_search = true;  ///< try other scale ratios and coarser scales when the full images give no geometry
   double min_log_significance = 6.0;  ///< least ViewMatch::log_significance of a geometry that is accepted, >= 0
@@ -54,7 +56,9 @@ struct PointViewMatcherParams
   std::vector<std::string> validate() const;
 };
 
-/** Matches two views of a scene by intensity profiles. Stateless between calls: the same input gives the same result. */
+/**
+ * Matches two views of a scene by intensity profiles. Stateless between calls: the same input gives the same result.
+ */
 class PointViewMatcher
 {
 public:
