@@ -2,10 +2,10 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "view_servo/ros/camera_input.h"
 
+#include "view_servo/images/image_io.h"
 #include "view_servo/ros/conversions.h"
 #include "view_servo/ros/node_base.h"
 #include "view_servo/ros/readiness.h"
-#include "view_servo/images/image_io.h"
 
 #include <ros/console.h>
 #include <ros/time.h>
@@ -142,10 +142,10 @@ void CameraInput::diagnose(diagnostic_updater::DiagnosticStatusWrapper& status)
 
 void CameraInput::frameCallback(const sensor_msgs::ImageConstPtr& image, const sensor_msgs::CameraInfoConstPtr& info)
 {
-  guarded("an image on '" + imageTopic() + "'", [&] { take(image, info); });
+  guarded("an image on '" + imageTopic() + "'", [&] { onPair(image, info); });
 }
 
-void CameraInput::take(const sensor_msgs::ImageConstPtr& image, const sensor_msgs::CameraInfoConstPtr& info)
+void CameraInput::onPair(const sensor_msgs::ImageConstPtr& image, const sensor_msgs::CameraInfoConstPtr& info)
 {
   const std::string fault = faultOf(*image, *info);
   {

@@ -2,8 +2,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "view_servo/ros/image_source.h"
 
-#include "view_servo/ros/conversions.h"
 #include "view_servo/images/image_io.h"
+#include "view_servo/ros/conversions.h"
 
 #include <cstdlib>
 #include <utility>
@@ -84,10 +84,10 @@ ImageSourceReader::ImageSourceReader(const ImageSourceParams& params, const Came
 {
 }
 
-SourcedImage ImageSourceReader::read(const ImageSource& source, const std::string& name) const
+SourcedImage ImageSourceReader::read(SourceKind kind, const ImageSource& source, const std::string& name) const
 {
   SourcedImage result;
-  switch (kindOf(source, name))
+  switch (kind)
   {
     case SourceKind::CAMERA:
     {

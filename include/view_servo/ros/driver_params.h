@@ -17,14 +17,14 @@ namespace view_servo
 /** Parameters that all drivers have. */
 struct DriverParams
 {
-  double timeout = 60.0;                   ///< of a goal that brings none [s], > 0
+  double timeout = 60.0;                   ///< of a goal that has none of its own [s], > 0
   double control_rate = 50.0;              ///< of commands [Hz], [10, 1000]
-  double start_patience = START_PATIENCE;  ///< that a goal waits for what it needs before it begins [s], > 0
+  double start_patience = START_PATIENCE;  ///< longest wait of a goal for what it needs before it begins [s], > 0
 
   void read(ParameterReader& reader);
 };
 
-/** Those of homing; the node's header says what they mean. */
+/** Parameters of the node homing, which documents them. */
 struct HomingDriverParams
 {
   DriverParams node;
@@ -42,7 +42,7 @@ struct HomingDriverParams
   static HomingDriverParams read(ParameterReader& reader);
 };
 
-/** Those of servo_25d; likewise. */
+/** Parameters of the node servo_25d, which documents them. */
 struct ServoDriverParams
 {
   DriverParams node;

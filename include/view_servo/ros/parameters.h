@@ -24,19 +24,19 @@ class ParameterReader
 public:
   explicit ParameterReader(const ros::NodeHandle& private_nh);
 
-  /** Each leaves the default where the parameter is not set. */
+  /** Each read() leaves the value as it is, the default, when the parameter is not set. */
   void read(const std::string& name, bool& value);
   void read(const std::string& name, int& value);
   void read(const std::string& name, double& value);
   void read(const std::string& name, std::string& value);
   void read(const std::vector<Parameter>& table);
-  /** Those of a sub-namespace: `~ns/name`. */
+  /** The same for parameters in a sub-namespace: `~ns/name`. */
   void read(const std::vector<Parameter>& table, const std::string& ns);
 
   void require(bool condition, const std::string& fault);
   void addFaults(const std::vector<std::string>& faults);
 
-  /** A parameter that somebody else reads from the private namespace. */
+  /** Declares a parameter that other code reads from the private namespace, so that finish() does not warn of it. */
   void expect(const std::string& name);
 
   /**
