@@ -76,13 +76,13 @@ public:
       worker_(
           context.resolved("image_raw"),
           [this](const HomingOutcome& outcome) {
-            context_.apply("the outcome of an image", [&] { onOutcome(outcome); });
+            context_.runLocked("the outcome of an image", [&] { onOutcome(outcome); });
           },
           [this](const CameraFrame& frame) { watchView(frame); }),
       camera_(
           context.nodeHandle(), params.camera,
           [this](const CameraFrame& frame) {
-            context_.apply("an image on " + images_.topics(), [&] { onFrame(frame); });
+            context_.runLocked("an image on " + images_.topics(), [&] { onFrame(frame); });
           },
           [this](const std::string& problem) { context_.locked([&] { images_.reject(problem); }); })
   {
@@ -111,14 +111,14 @@ public:
     }
     const StoredView stored = store_.load(view);
     context_.locked([&] { want(view, context_.goalId()); });
-    context_.wantView(view);
+    context_.requestView(view);
     // Only an image that has come since: the camera may be another than it was.
     CameraFrame before;
     CameraFrame frame;
     camera_.missing(before);
-    context_.require([&] { return camera_.missing(frame, before); });
-    context_.require([this] { return context_.locked([this] { return odometryLacks(); }); });
-    context_.require(
+    context_.waitFor([&] { return camera_.missing(frame, before); });
+    context_.waitFor([this] { return context_.locked([this] { return odometryLacks(); }); });
+    context_.waitFor(
         [&] { return transforms_.missing(params_.base_frame, frame.image->header.frame_id, ros::Time(0)); });
     HomingParams homing = params_.homing;
     if (goal.step > 0.0)
@@ -127,19 +127,19 @@ public:
       homing.near_step = std::min(homing.near_step, goal.step);
     }
     auto task = std::make_unique<Task>(makeTask(stored, frame, homing));
-    context_.require([this] { return context_.locked([this] { return missingAnswer({ &points_, &lines_ }); }); });
+    context_.waitFor([this] { return context_.locked([this] { return missingAnswer({ &points_, &lines_ }); }); });
     return task;
   }
 
   void begin(std::unique_ptr<Task> task)
   {
-    start(*task);
+    setTask(*task);
     travelled_ = 0.0;
   }
 
   void end()
   {
-    start(nullptr);
+    setTask(nullptr);
     want(params_.view, "");
   }
 
@@ -163,13 +163,13 @@ public:
   static void sent(double /*time*/, const Velocity& /*velocity*/)
   {
   }
-  static void stands(double /*time*/, const std::string& /*why*/)
+  static void onMissingInput(double /*time*/, const std::string& /*why*/)
   {
   }
 
-  bool heard() const
+  bool hasListener() const
   {
-    return output_.heard();
+    return output_.hasListener();
   }
 
   void publish(const Velocity& velocity) const
@@ -177,7 +177,7 @@ public:
     output_.publish(velocity);
   }
 
-  std::optional<double> answered()
+  std::optional<double> takeLatency()
   {
     const std::optional<Clock::time_point> time = std::exchange(unanswered_, std::nullopt);
     return time ? std::optional<double>(1e3 * std::chrono::duration<double>(Clock::now() - *time).count())
@@ -220,15 +220,15 @@ private:
     lines_.want(view, goal);
   }
 
-  /** Works for another task from now on; empty: none. */
-  void start(std::shared_ptr<HomingTask> task)
+  /** Replaces the task, and forgets all that belongs to the old one; null: no task. */
+  void setTask(std::shared_ptr<HomingTask> task)
   {
     task_ = std::move(task);
     report_ = HomingReport();
     course_ = Course();
     unanswered_.reset();
     odd_stamps_ = 0;
-    worker_.start(task_);
+    worker_.setTask(task_);
   }
 
   // --------------------------------------------------------------------------------------- what a goal waits for
@@ -263,7 +263,7 @@ private:
     if (!input.jump().empty())
     {
       context_.abort(input.jump());
-      start(nullptr);
+      setTask(nullptr);
     }
     return usable;
   }
@@ -278,7 +278,7 @@ private:
     if (task_ && !sameCalibration(*task_->info, *frame.info))
     {
       context_.abort("the camera's calibration has changed");
-      start(nullptr);
+      setTask(nullptr);
     }
     const std::string apart = stampsApart(odometry_, images_);
     odd_stamps_ = apart.empty() ? 0 : odd_stamps_ + 1;
@@ -337,7 +337,7 @@ private:
     if (!outcome.fault.empty())
     {
       context_.abort("an image or matches cannot be used: " + outcome.fault);
-      start(nullptr);
+      setTask(nullptr);
       return;
     }
     report_ = outcome.report;
@@ -352,7 +352,7 @@ private:
     const bool ended = report_.state == HomingState::ARRIVED || report_.state == HomingState::FAILED;
     if (ended && !context_.goalRuns())
     {
-      start(nullptr);  // watched anew with the next image
+      setTask(nullptr);  // watched anew with the next image
     }
   }
 
@@ -368,10 +368,10 @@ private:
     try
     {
       const std::shared_ptr<HomingTask> task = makeTask(store_.load(params_.view), frame, params_.homing);
-      context_.apply("the watch for a view", [&] {
+      context_.runLocked("the watch for a view", [&] {
         if (!task_ && context_.goalId().empty())
         {
-          start(task);
+          setTask(task);
         }
       });
     }

@@ -58,10 +58,10 @@ HomographyTrackerNodeParams readTrackerParams(const ros::NodeHandle& private_nh)
 struct Task
 {
   ChosenView chosen;
-  std::uint64_t number = 0;  // another one for each choice
+  std::uint64_t number = 0;  // counts choices
 };
 
-/** For diagnostics. */
+/** What diagnostics report. */
 struct Status
 {
   TrackingState state = TrackingState::SEARCHING;
@@ -120,7 +120,7 @@ public:
     {
       const std::lock_guard<std::mutex> lock(mutex_);
       choice_.choose(params_.view);
-      begin(nullptr);
+      onChoice(nullptr);
     }
     wanted_subscriber_ = subscribe<WantedView>("wanted_view", 5,
                                                [this](const WantedView::ConstPtr& message) { onWantedView(*message); });
@@ -154,7 +154,7 @@ private:
     {
       const std::lock_guard<std::mutex> lock(mutex_);
       choice_.choose(request.view);
-      begin(std::move(preparation.session));
+      onChoice(std::move(preparation.session));
     }
     response.success = true;
     response.message = "follows view '" + request.view + "'" +
@@ -167,7 +167,7 @@ private:
     const std::lock_guard<std::mutex> lock(mutex_);
     const std::string view = choice_.chosen().view;
     choice_.choose("");
-    begin(nullptr);
+    onChoice(nullptr);
     response.success = true;
     response.message = view.empty() ? "no view was followed" : "view '" + view + "' is not followed any more";
     ROS_INFO_STREAM(response.message);
@@ -178,13 +178,13 @@ private:
     const std::lock_guard<std::mutex> lock(mutex_);
     if (choice_.want(message))
     {
-      begin(nullptr);
+      onChoice(nullptr);
       ROS_INFO_STREAM("wanted: view '" << message.view << "', goal '" << message.goal << "'");
     }
   }
 
-  /** Another choice is made. The mutex is held. @param session when it is prepared already. */
-  void begin(std::unique_ptr<PlaneSession> session)
+  /** Has the follower turn to the choice just made. The mutex is held. @param session null: not prepared yet. */
+  void onChoice(std::unique_ptr<PlaneSession> session)
   {
     prepared_ = std::move(session);
     ++task_number_;
@@ -282,7 +282,7 @@ private:
   {
     const Clock::time_point begin_time = Clock::now();
     const std_msgs::Header& header = frame.image->header;
-    if (!session_->isOf(*frame.info))
+    if (!session_->checkCalibration(*frame.info))
     {
       const std::string reason = "the camera's calibration has changed";
       ROS_ERROR_STREAM_THROTTLE(10.0, reason << ": view '" << task.chosen.view << "' has to be chosen anew");
@@ -292,7 +292,7 @@ private:
     }
     const cv::Mat image = toGrey(*frame.image, camera_.imageTopic());
     std::string news;
-    const std::string jump = session_->advance(header.stamp);
+    const std::string jump = session_->checkTime(header.stamp);
     if (!jump.empty())
     {
       ROS_WARN_STREAM(jump << ": the view is looked for anew");
@@ -333,9 +333,9 @@ private:
   // ----------------------------------------------------------------------------------------------------- publishing
 
   /**
-   * For logs, diagnostics and messages.
-   * @param news why the view is not tracked; empty: as before.
-   * @return why, now; empty when it is tracked.
+   * Updates what diagnostics report, and logs changes.
+   * @param news why the view is not tracked; empty: the reason is the same as before.
+   * @return why the view is not tracked; empty when it is.
    */
   std::string updateStatus(const Task& task, const PlaneTrack& track, const std::string& news)
   {
@@ -437,7 +437,7 @@ private:
   PlaneSearcher searcher_;
   std::unique_ptr<PlaneSession> session_;
   Clock::time_point last_frame_;  // or when the session began
-  std::uint64_t era_ = 0;         // another one for each session, and when time goes back
+  std::uint64_t era_ = 0;         // counts sessions, and times that time went back
   struct
   {
     std::uint64_t number = 0;

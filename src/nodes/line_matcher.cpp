@@ -8,7 +8,6 @@
 #include "view_servo/ros/streaming_matcher.h"
 #include "view_servo/views/line_view_matcher.h"
 
-#include <chrono>
 #include <functional>
 #include <limits>
 #include <stdexcept>
@@ -68,11 +67,7 @@ public:
   ViewMatch match(const PreparedImage& reference, const PreparedImage& current, const Options& options,
                   const std::function<bool()>& /*given_up*/) const
   {
-    using Clock = std::chrono::steady_clock;
-    const Clock::time_point start = Clock::now();
-    ViewMatch result = matcher_.match(reference.lines(), current.lines(), GeometryModel::HOMOGRAPHY, options.groups);
-    result.elapsed_ms = std::chrono::duration<double, std::milli>(Clock::now() - start).count();  // with the detection
-    return result;
+    return matcher_.match(reference, current, GeometryModel::HOMOGRAPHY, options.groups);
   }
 
   static void fill(const ViewMatch& result, Service::Response& response)

@@ -118,11 +118,11 @@ public:
     }
     const StoredView stored = store_.load(goal.view);
     context_.locked([&] { answer_.want(stored.name, context_.goalId()); });
-    context_.wantView(stored.name);
+    context_.requestView(stored.name);
     // Only one that has come since: the camera may be another than it was.
     context_.locked([this] { info_.reset(); });
     sensor_msgs::CameraInfo::ConstPtr info;
-    context_.require([&] {
+    context_.waitFor([&] {
       info = context_.locked([this] { return info_; });
       return info ? "" : "no camera_info has come on " + context_.quoted("camera_info");
     });
@@ -145,7 +145,7 @@ public:
     auto task = std::make_unique<Task>(
         rectifier, ServoTarget{ rectifier.k(), { size.width, size.height }, rectifier.point(middle) }, params);
     task->view = stored.name;
-    context_.require([this] { return context_.locked([this] { return missingAnswer({ &answer_ }); }); });
+    context_.waitFor([this] { return context_.locked([this] { return missingAnswer({ &answer_ }); }); });
     return task;
   }
 
@@ -207,7 +207,7 @@ public:
     task_->servo.sent(time, twist);
   }
 
-  void stands(double time, const std::string& why)
+  void onMissingInput(double time, const std::string& why)
   {
     joints_.rest();
     if (task_->found)
@@ -216,7 +216,7 @@ public:
     }
   }
 
-  bool heard() const
+  bool hasListener() const
   {
     return command_publisher_.getNumSubscribers() > 0;
   }
@@ -232,7 +232,7 @@ public:
     command_publisher_.publish(message);
   }
 
-  std::optional<double> answered()
+  std::optional<double> takeLatency()
   {
     if (!task_ || !std::exchange(task_->unanswered, false))
     {
@@ -289,7 +289,7 @@ private:
   void onCameraInfo(const sensor_msgs::CameraInfo::ConstPtr& message)
   {
     info_ = message;
-    if (task_ && !task_->rectifier.isOf(*message))
+    if (task_ && !task_->rectifier.hasCalibration(*message))
     {
       context_.abort(isCalibrated(*message) ? "the camera's calibration has changed" : uncalibrated());
     }

@@ -62,7 +62,7 @@ public:
 private:
   void save(const SaveView::Request& request, SaveView::Response& response)
   {
-    const SourcedImage source = sources_.read(request.source, "source");
+    const SourcedImage source = sources_.read(kindOf(request.source, "source"), request.source, "source");
     StoredView view;
     view.name = request.name;
     view.image = source.grey;

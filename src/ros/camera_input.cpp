@@ -143,10 +143,10 @@ void CameraInput::diagnose(diagnostic_updater::DiagnosticStatusWrapper& status)
 
 void CameraInput::frameCallback(const sensor_msgs::ImageConstPtr& image, const sensor_msgs::CameraInfoConstPtr& info)
 {
-  guarded("an image on '" + imageTopic() + "'", [&] { take(image, info); });
+  guarded("an image on '" + imageTopic() + "'", [&] { onPair(image, info); });
 }
 
-void CameraInput::take(const sensor_msgs::ImageConstPtr& image, const sensor_msgs::CameraInfoConstPtr& info)
+void CameraInput::onPair(const sensor_msgs::ImageConstPtr& image, const sensor_msgs::CameraInfoConstPtr& info)
 {
   const std::string fault = faultOf(*image, *info);
   {

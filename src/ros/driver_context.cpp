@@ -69,7 +69,7 @@ DriverInput& DriverContext::addInput(const std::string& what, const std::string&
   return *inputs_.back();
 }
 
-void DriverContext::require(const std::function<std::string()>& missing)
+void DriverContext::waitFor(const std::function<std::string()>& missing)
 {
   const auto ended = [this] {
     return locked([this] { return !preparing(); });
@@ -90,7 +90,7 @@ void DriverContext::require(const std::function<std::string()>& missing)
   }
 }
 
-void DriverContext::wantView(const std::string& view)
+void DriverContext::requestView(const std::string& view)
 {
   locked([&] {
     if (preparing())

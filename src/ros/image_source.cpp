@@ -106,10 +106,10 @@ ImageSourceReader::ImageSourceReader(const ImageSourceParams& params, const Came
 {
 }
 
-SourcedImage ImageSourceReader::read(const ImageSource& source, const std::string& name) const
+SourcedImage ImageSourceReader::read(SourceKind kind, const ImageSource& source, const std::string& name) const
 {
   SourcedImage result;
-  switch (kindOf(source, name))
+  switch (kind)
   {
     case SourceKind::CAMERA:
     {

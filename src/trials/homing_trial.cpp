@@ -163,7 +163,7 @@ HomingOutcome HomingTrials::run(const PlanarPose& start, const std::function<voi
         if (by_lines)
         {
           matches.push_back(
-              toMatches(parts_->lines.match(parts_->reference->lines(), current.lines(), GeometryModel::HOMOGRAPHY,
+              toMatches(parts_->lines.match(*parts_->reference, current, GeometryModel::HOMOGRAPHY,
                                             params_.line_pairs ? LineGrouping::PAIRS : LineGrouping::TRIPLETS),
                         time, time + params_.matching_time));
         }

@@ -6,7 +6,7 @@
 #include "sim/world.h"
 #include "view_servo/control/homing.h"
 #include "view_servo/control/velocity_limiter.h"
-#include "view_servo/geometry/planar_motion.h"
+#include "view_servo/geometry/planar_pose.h"
 
 #include <cstdint>
 #include <functional>

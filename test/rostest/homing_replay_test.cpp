@@ -10,7 +10,7 @@
 
 #include "view_servo/Heading.h"
 #include "view_servo/SetView.h"
-#include "view_servo/geometry/planar_motion.h"
+#include "view_servo/geometry/planar_pose.h"
 #include "view_servo/views/view_store.h"
 #include "test_paths.h"
 

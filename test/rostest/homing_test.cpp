@@ -10,7 +10,7 @@
 #include "view_servo/HomeToViewAction.h"
 #include "view_servo/LineMatches.h"
 #include "view_servo/PointMatches.h"
-#include "view_servo/geometry/planar_motion.h"
+#include "view_servo/geometry/planar_pose.h"
 #include "view_servo/views/point_view_matcher.h"
 #include "view_servo/views/view_store.h"
 #include "test_paths.h"

@@ -4,7 +4,7 @@
 
 #include "view_servo/control/heading_vote.h"
 #include "view_servo/geometry/essential.h"
-#include "view_servo/geometry/planar_motion.h"
+#include "view_servo/geometry/planar_pose.h"
 #include "view_servo/parameters/parameter.h"
 #include "view_servo/robust/random.h"
 

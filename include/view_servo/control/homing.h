@@ -10,7 +10,7 @@
 #include "view_servo/control/odometry_history.h"
 #include "view_servo/control/velocity_limiter.h"
 #include "view_servo/geometry/camera.h"
-#include "view_servo/geometry/planar_motion.h"
+#include "view_servo/geometry/planar_pose.h"
 #include "view_servo/parameters/parameter.h"
 #include "view_servo/tracking/view_tracker.h"
 

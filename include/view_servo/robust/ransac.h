@@ -76,7 +76,7 @@ struct RansacResult
 template <typename Estimator>
 RansacResult<typename Estimator::Model> ransac(const Estimator& estimator, const RansacParams& params, Rng& rng);
 
-/** The same with samples from elsewhere and support measured otherwise; params.sampling has no meaning then. */
+/** The same with a given source of samples and a given measure of support; params.sampling is not used. */
 template <typename Estimator>
 RansacResult<typename Estimator::Model> ransac(const Estimator& estimator, Sampler& sampler,
                                                Consensus<typename Estimator::Model>& consensus,

@@ -70,17 +70,17 @@ private:
 /** A status without errors or inliers, stamped now. */
 ServoStatus makeStatus(std::uint8_t state, const std::string& reason);
 
-/** That of a node without a goal. */
+/** The status of a node without a goal. */
 ServoStatus idleStatus(const CommandGate& gate);
 
-/** Whether idleStatus() has to be told, because the gate has been switched since the last status. */
+/** Whether idleStatus() has to be published because the gate was switched after the last status. */
 bool isOutdated(const ServoStatus& last, const CommandGate& gate);
 
 /** After a robot was moved, zeros are sent for some cycles, and then nothing, so that another node may drive it. */
 class StopBurst
 {
 public:
-  /** A command was sent. */
+  /** To be called when a command was sent. */
   void sent(bool zero)
   {
     count_ = zero ? count_ + 1 : 0;
@@ -100,13 +100,16 @@ private:
 
 namespace detail
 {
-/** Has SIGINT, SIGTERM and the master's order to shut down only ask for an end, so that a node can stop its robot first. */
+/**
+ * From now on SIGINT, SIGTERM and the master's order to shut down only make shutdownRequested() true, so that a node
+ * can stop its robot before ROS ends.
+ */
 void deferShutdown();
 bool shutdownRequested();
 }  // namespace detail
 
 /**
- * As runNode(), for a node that drives something: before ROS shuts down, its `stop()` is called, which sends zero.
+ * As runNode(), for a node that drives a robot: its `stop()`, which sends zero, is called before ROS shuts down.
  * @return 1 when the node refuses to start.
  */
 template <typename Node>

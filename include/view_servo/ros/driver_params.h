@@ -27,7 +27,7 @@ struct DriverParams
 /** Names, units, ranges and meanings of these parameters, here and below. */
 std::vector<Parameter> parameters(DriverParams& params);
 
-/** Those of homing. */
+/** Parameters of the node homing. */
 struct HomingDriverParams
 {
   DriverParams node;
@@ -57,7 +57,7 @@ struct HomingDriverParams
 
 std::vector<Parameter> parameters(HomingDriverParams& params);
 
-/** Those of servo_25d; likewise. */
+/** Parameters of the node servo_25d. */
 struct ServoDriverParams
 {
   DriverParams node;

@@ -25,9 +25,9 @@ class ParameterReader
 public:
   explicit ParameterReader(const ros::NodeHandle& private_nh);
 
-  /** Leaves the defaults of parameters that are not set. */
+  /** Leaves the values of parameters that are not set as they are, which are the defaults. */
   void read(const std::vector<Parameter>& table);
-  /** Those of a sub-namespace: `~ns/name`. */
+  /** The same for parameters in a sub-namespace: `~ns/name`. */
   void read(const std::vector<Parameter>& table, const std::string& ns);
 
   void addFaults(const std::vector<std::string>& faults);
