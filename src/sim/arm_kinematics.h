@@ -25,8 +25,9 @@ struct ArmKinematicsParams
 };
 
 /**
- * The kinematics of an arm with six revolute joints that carries a camera, as its URDF has it: poses, inverse kinematics,
- * and joint velocities for a twist of the camera, with what the joints' limits leave of them. It has no state.
+ * The kinematics of an arm with six revolute joints that carries a camera, as its URDF has it: poses, inverse
+ * kinematics, and joint velocities for a twist of the camera, with what the joints' limits leave of them. It has no
+ * state.
  *
  * Poses are those of the camera's optical frame in `base_link`. Twists are those of the camera, in its optical frame.
  */
@@ -78,16 +79,17 @@ public:
   Jacobian jacobian(const Joints& joints) const;
 
   /**
-   * Joint angles within their limits that bring the camera to a pose, within 1e-6 m and rad. The search starts at `near` and
-   * at fixed angles that are spread over the joints' ranges; of the solutions found, the nearest to `near` is returned.
+   * Joint angles within their limits that bring the camera to a pose, within 1e-6 m and rad. The search starts at
+   * `near` and at fixed angles that are spread over the joints' ranges; of the solutions found, the nearest to `near`
+   * is returned.
    * @param pose base_link from the optical frame.
    * @return empty when the pose is out of reach, or its rotation is none.
    */
   std::optional<Joints> inverse(const Eigen::Isometry3d& pose, const Joints& near) const;
 
   /**
-   * Joint velocities for a twist, by damped least squares: without damping while the smallest singular value of the Jacobian
-   * is at least `min_manipulability`, with damping that grows smoothly to `damping` as that value falls to 0.
+   * Joint velocities for a twist, by damped least squares: without damping while the smallest singular value of the
+   * Jacobian is at least `min_manipulability`, with damping that grows smoothly to `damping` as that value falls to 0.
    */
   Following follow(const Joints& joints, const Twist& twist) const;
 
@@ -95,17 +97,18 @@ public:
   Slowdown withinVelocityLimits(const Joints& velocities) const;
 
   /**
-   * What is left of joint velocities so that the arm can keep them for `dt` [s] and can still stop before any joint's end
-   * afterwards. While it stops, all joints slow down in proportion, the fastest one with `acceleration` [rad/s²].
+   * What is left of joint velocities so that the arm can keep them for `dt` [s] and can still stop before any joint's
+   * end afterwards. While it stops, all joints slow down in proportion, the fastest one with `acceleration` [rad/s²].
    */
   Slowdown beforeEnds(const Joints& joints, const Joints& velocities, double dt, double acceleration) const;
 
   /**
    * The joint velocities that can be reached from `velocities` within `dt` [s], when no joint accelerates by more than
-   * `acceleration` [rad/s²]: `wanted`, or as large a part of it as possible, which keeps the camera on its path. When no part
-   * of it can be reached, the velocities change towards the nearest part, but not so far that a joint could no longer stop
-   * before its end.
-   * @param wanted passes beforeEnds() unchanged, as `velocities` did when they were chosen; then braking always suffices.
+   * `acceleration` [rad/s²]: `wanted`, or as large a part of it as possible, which keeps the camera on its path. When
+   * no part of it can be reached, the velocities change towards the nearest part, but not so far that a joint could no
+   * longer stop before its end.
+   * @param wanted passes beforeEnds() unchanged, as `velocities` did when they were chosen; then braking always
+   * suffices.
    */
   Joints accelerate(const Joints& joints, const Joints& velocities, const Joints& wanted, double dt,
                     double acceleration) const;

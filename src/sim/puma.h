@@ -29,13 +29,13 @@ struct PumaParams : ArmKinematicsParams
 };
 
 /**
- * A Puma 560 that follows twists of its camera. ArmKinematics turns them into joint velocities, which are scaled down so that
- * no joint exceeds its velocity limit or runs into its end. Such limits slow the camera down on its path. It leaves the path
- * only where the joints cannot brake as fast as the path turns: at high speed, near a singularity of the wrist, and when the
- * twist changes suddenly.
+ * A Puma 560 that follows twists of its camera. ArmKinematics turns them into joint velocities, which are scaled down
+ * so that no joint exceeds its velocity limit or runs into its end. Such limits slow the camera down on its path. It
+ * leaves the path only where the joints cannot brake as fast as the path turns: at high speed, near a singularity of
+ * the wrist, and when the twist changes suddenly.
  *
- * The arm controls itself by the true joint angles, without noise, but believes the camera to be where the URDF has it. The
- * true camera is off by the constant hand-eye error. An object must not be used by several threads at once.
+ * The arm controls itself by the true joint angles, without noise, but believes the camera to be where the URDF has it.
+ * The true camera is off by the constant hand-eye error. An object must not be used by several threads at once.
  */
 class Puma
 {

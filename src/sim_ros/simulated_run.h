@@ -2,8 +2,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include "sim/world_reader.h"
 #include "sim_ros/robot_messages.h"
-#include "sim/world.h"
 #include "view_servo/SaveView.h"
 #include "view_servo/ServoStatus.h"
 #include "view_servo/SetPose.h"

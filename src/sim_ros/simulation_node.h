@@ -2,9 +2,9 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-#include "sim_ros/robot_messages.h"
 #include "sim/renderer.h"
-#include "sim/world.h"
+#include "sim/world_reader.h"
+#include "sim_ros/robot_messages.h"
 #include "view_servo/SetLight.h"
 #include "view_servo/SetPose.h"
 #include "view_servo/ros/conversions.h"
@@ -65,16 +65,12 @@ struct SimulationParams
   /** The world of that name, or in that file, with the noise asked for. */
   World load(RobotKind robot) const
   {
-    World result = findWorld(world, ros::package::getPath("view_servo") + "/config/worlds");
+    const World result = findWorld(world, ros::package::getPath("view_servo") + "/config/worlds");
     if (result.robot != robot)
     {
       throw std::invalid_argument("world '" + result.name + "' is for another robot");
     }
-    if (image_noise >= 0.0)
-    {
-      result.quality.noise = image_noise;
-    }
-    return result;
+    return withImageNoise(result, image_noise);
   }
 
   std::vector<std::string> groupNames() const

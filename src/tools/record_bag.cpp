@@ -6,7 +6,7 @@
 #include "sim/nomad.h"
 #include "sim/puma.h"
 #include "sim/renderer.h"
-#include "sim/world.h"
+#include "sim/world_reader.h"
 #include "view_servo/ros/conversions.h"
 #include "view_servo/images/image_io.h"
 

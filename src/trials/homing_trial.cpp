@@ -3,11 +3,11 @@
 #include "trials/homing_trial.h"
 
 #include "sim/renderer.h"
-#include "trials/trial.h"
 #include "sim/visibility.h"
+#include "trials/trial.h"
 #include "view_servo/views/line_view_matcher.h"
-#include "view_servo/views/prepared_image.h"
 #include "view_servo/views/point_view_matcher.h"
+#include "view_servo/views/prepared_image.h"
 
 #include <opencv2/imgproc.hpp>
 

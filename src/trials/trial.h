@@ -34,24 +34,4 @@ private:
   double next_ = 0.0;
 };
 
-/** @param error by which the calibration has the focal lengths too long, as a part of them. */
-inline Camera withFocalLengthError(Camera camera, double error)
-{
-  camera.k(0, 0) *= 1.0 + error;
-  camera.k(1, 1) *= 1.0 + error;
-  camera.projection(0, 0) *= 1.0 + error;
-  camera.projection(1, 1) *= 1.0 + error;
-  return camera;
-}
-
-/** @param noise sd [grey levels]; negative: the world's. */
-inline World withImageNoise(World world, double noise)
-{
-  if (noise >= 0.0)
-  {
-    world.quality.noise = noise;
-  }
-  return world;
-}
-
 }  // namespace view_servo::sim
