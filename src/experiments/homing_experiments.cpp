@@ -6,6 +6,7 @@
 #include "tools/package_folder.h"
 #include "parallel.h"
 #include "trials/homing_trial.h"
+#include "sim/world_reader.h"
 #include "view_servo/control/heading_hypotheses.h"
 #include "view_servo/geometry/camera.h"
 #include "view_servo/robust/random.h"

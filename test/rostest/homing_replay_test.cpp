@@ -3,6 +3,7 @@
 #include "child_process.h"
 #include "node_test.h"
 #include "sim_ros/robot_messages.h"
+#include "sim/world_reader.h"
 #include "sim/nomad.h"
 #include "sim/renderer.h"
 #include "support/recorded_bag.h"

@@ -4,7 +4,7 @@
 #include "sim_ros/robot_messages.h"
 #include "sim/nomad.h"
 #include "sim/renderer.h"
-#include "sim/world.h"
+#include "sim/world_reader.h"
 
 #include "view_servo/Heading.h"
 #include "view_servo/HomeToViewAction.h"
