@@ -2,6 +2,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "view_servo/features/profiles.h"
 
+#include "view_servo/images/sampling.h"
+
 #include <opencv2/core.hpp>
 
 #include <algorithm>
@@ -71,28 +73,19 @@ std::vector<Basis> basisTables(int coefficients)
 }
 
 template <int Coefficients>
-bool describe(const cv::Mat& image, const Eigen::Vector2d& start, const Eigen::Vector2d& end, int samples,
+bool describe(const BilinearSampler& image, const Eigen::Vector2d& start, const Eigen::Vector2d& end, int samples,
               const Basis& basis, double min_contrast, float* features)
 {
   float intensities[MAX_SAMPLES];
   float sums[Coefficients] = {};
   const Eigen::Vector2f step = ((end - start) / samples).cast<float>();
   const Eigen::Vector2f first = start.cast<float>() + 0.5F * step;
-  const unsigned char* data = image.data;
-  const std::size_t stride = image.step;
   float total = 0.0F;
   for (int i = 0; i < samples; ++i)
   {
-    const float x = first.x() + static_cast<float>(i) * step.x();
-    const float y = first.y() + static_cast<float>(i) * step.y();
-    const int u = static_cast<int>(x);
-    const int v = static_cast<int>(y);
-    const float fx = x - static_cast<float>(u);
-    const float fy = y - static_cast<float>(v);
-    const unsigned char* p = data + static_cast<std::size_t>(v) * stride + u;
-    const float upper = static_cast<float>(p[0]) + fx * static_cast<float>(p[1] - p[0]);
-    const float lower = static_cast<float>(p[stride]) + fx * static_cast<float>(p[stride + 1] - p[stride]);
-    const float intensity = upper + fy * (lower - upper);
+    const float u = first.x() + static_cast<float>(i) * step.x();
+    const float v = first.y() + static_cast<float>(i) * step.y();
+    const float intensity = image.at(u, v);
     intensities[i] = intensity;
     total += intensity;
     const float* b = basis.row(i);
@@ -118,7 +111,7 @@ bool describe(const cv::Mat& image, const Eigen::Vector2d& start, const Eigen::V
   return true;
 }
 
-bool describe(const cv::Mat& image, const Eigen::Vector2d& start, const Eigen::Vector2d& end, int coefficients,
+bool describe(const BilinearSampler& image, const Eigen::Vector2d& start, const Eigen::Vector2d& end, int coefficients,
               const std::vector<Basis>& tables, double min_contrast, float* features)
 {
   const int samples = sampleCount((end - start).norm());
@@ -132,12 +125,6 @@ bool describe(const cv::Mat& image, const Eigen::Vector2d& start, const Eigen::V
     default:
       return describe<8>(image, start, end, samples, basis, min_contrast, features);
   }
-}
-
-/** Bilinear sampling reads the pixel to the right and the one below. */
-bool inside(const cv::Mat& image, const Eigen::Vector2d& point)
-{
-  return point.x() >= 0.0 && point.y() >= 0.0 && point.x() < image.cols - 1.0 && point.y() < image.rows - 1.0;
 }
 
 void requireGrey(const cv::Mat& image)
@@ -254,15 +241,16 @@ ProfileSet extractProfiles(const cv::Mat& image, const std::vector<Corner>& corn
   std::vector<float> features(pairs.size() * columns);
   std::vector<char> described(pairs.size(), 0);
   const std::vector<Basis> tables = basisTables(params.coefficients);
+  const BilinearSampler sampler(image);
   cv::parallel_for_(cv::Range(0, static_cast<int>(pairs.size())), [&](const cv::Range& range) {
     for (int i = range.start; i < range.end; ++i)
     {
       const std::size_t k = static_cast<std::size_t>(i);
       const Eigen::Vector2d& start = corners[static_cast<std::size_t>(pairs[k].start)].position;
       const Eigen::Vector2d& end = corners[static_cast<std::size_t>(pairs[k].end)].position;
-      const bool good =
-          inside(image, start) && inside(image, end) &&
-          describe(image, start, end, params.coefficients, tables, params.min_contrast, features.data() + k * columns);
+      const bool good = sampler.contains(start.x(), start.y()) && sampler.contains(end.x(), end.y()) &&
+                        describe(sampler, start, end, params.coefficients, tables, params.min_contrast,
+                                 features.data() + k * columns);
       described[k] = good ? 1 : 0;
     }
   });
@@ -283,11 +271,12 @@ bool profileFeatures(const cv::Mat& image, const Eigen::Vector2d& start, const E
                      const ProfileParams& params, float* features)
 {
   requireGrey(image);
-  if (!inside(image, start) || !inside(image, end))
+  const BilinearSampler sampler(image);
+  if (!sampler.contains(start.x(), start.y()) || !sampler.contains(end.x(), end.y()))
   {
     return false;
   }
-  return describe(image, start, end, params.coefficients, basisTables(params.coefficients), params.min_contrast,
+  return describe(sampler, start, end, params.coefficients, basisTables(params.coefficients), params.min_contrast,
                   features);
 }
 

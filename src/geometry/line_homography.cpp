@@ -106,6 +106,46 @@ std::optional<Eigen::Matrix3d> affinityFromLines(const SegmentPairs& pairs)
   return denormalized(matrixFromRows(values), from, to);
 }
 
+std::optional<Eigen::Matrix3d> plausibleAffinity(const Eigen::Vector2d* from, const Eigen::Vector2d* to,
+                                                 const double* weights, int n, const AffinityLimits& limits)
+{
+  Eigen::Vector2d mean_from = Eigen::Vector2d::Zero();
+  Eigen::Vector2d mean_to = Eigen::Vector2d::Zero();
+  double sum = 0.0;
+  for (int i = 0; i < n; ++i)
+  {
+    mean_from += weights[i] * from[i];
+    mean_to += weights[i] * to[i];
+    sum += weights[i];
+  }
+  mean_from /= sum;
+  mean_to /= sum;
+  Eigen::Matrix2d spread = Eigen::Matrix2d::Zero();
+  Eigen::Matrix2d mixed = Eigen::Matrix2d::Zero();
+  for (int i = 0; i < n; ++i)
+  {
+    spread += weights[i] * (from[i] - mean_from) * (from[i] - mean_from).transpose();
+    mixed += weights[i] * (to[i] - mean_to) * (from[i] - mean_from).transpose();
+  }
+  constexpr double FLAT = 1e-3;  // of the squared trace
+  if (!(spread.determinant() > FLAT * spread.trace() * spread.trace()))
+  {
+    return std::nullopt;
+  }
+  Eigen::Matrix3d map = Eigen::Matrix3d::Identity();
+  map.topLeftCorner<2, 2>() = mixed * spread.inverse();
+  map.topRightCorner<2, 1>() = mean_to - map.topLeftCorner<2, 2>() * mean_from;
+  const double determinant = map.topLeftCorner<2, 2>().determinant();
+  // (s1² + s2²) / (s1 s2), about s1 / s2 when they differ.
+  const double anisotropy = map.topLeftCorner<2, 2>().squaredNorm() / determinant;
+  if (!(determinant > 1.0 / (limits.scale_change * limits.scale_change) &&
+        determinant < limits.scale_change * limits.scale_change && anisotropy < limits.anisotropy))
+  {
+    return std::nullopt;
+  }
+  return map;
+}
+
 std::optional<Segment> transfer(const Eigen::Matrix3d& h, const Segment& segment)
 {
   constexpr double MIN_DEPTH = 0.1;

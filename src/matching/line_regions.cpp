@@ -2,8 +2,9 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "view_servo/matching/line_regions.h"
 
+#include "agreeing_segments.h"
+#include "view_servo/features/side_correlation.h"
 #include "view_servo/geometry/line_homography.h"
-#include "view_servo/matching/line_groups.h"
 
 #include <Eigen/Geometry>
 #include <Eigen/LU>
@@ -20,9 +21,7 @@ namespace view_servo
 {
 namespace
 {
-constexpr double MIN_OVERLAP = 0.35;       // of the shorter segment, for two to agree
-constexpr double MAX_SCALE_CHANGE = 5.0;   // of a local map
-constexpr double MAX_ANISOTROPY = 6.0;     // ratio of a local map's singular values, about
+constexpr AffinityLimits AFFINITY_LIMITS;  // of local maps
 constexpr std::size_t MIN_HOMOGRAPHY = 8;  // matches from which on a homography is fitted rather than an affine map
 constexpr int BATCH = 32;                  // candidates evaluated side by side; fixed, so that results are
 
@@ -40,154 +39,6 @@ double support(const std::vector<SegmentMatch>& matches)
   }
   return sum;
 }
-
-/** A segment in the current image that others are compared with, most of which are soon told not to agree. */
-class Probe
-{
-public:
-  Probe(const Segment& segment, double tolerance, double min_cosine)
-    : segment_(segment),
-      tolerance_(tolerance),
-      min_cosine_(min_cosine),
-      along_(segment.end - segment.start),
-      least_(min_cosine * along_.norm()),
-      low_(segment.start.array().min(segment.end.array()) - tolerance),
-      high_(segment.start.array().max(segment.end.array()) + tolerance)
-  {
-  }
-
-  /** The share that both have in common, 0 when they do not agree. @param direction of the other, a unit vector. */
-  double agreement(const Segment& other, const Eigen::Vector2d& direction) const
-  {
-    if (along_.dot(direction) < least_ || (other.start.array().max(other.end.array()) < low_).any() ||
-        (other.start.array().min(other.end.array()) > high_).any())
-    {
-      return 0.0;
-    }
-    const SegmentAgreement found = compare(segment_, other);
-    return found.cosine >= min_cosine_ && found.overlap >= MIN_OVERLAP && found.distance <= tolerance_ ? found.share
-                                                                                                       : 0.0;
-  }
-
-  /** From start to end [px]. */
-  const Eigen::Vector2d& along() const
-  {
-    return along_;
-  }
-  /** Component of along() in the direction of a segment that agrees, at least [px]. */
-  double least() const
-  {
-    return least_;
-  }
-
-private:
-  const Segment segment_;
-  const double tolerance_;
-  const double min_cosine_;
-  const Eigen::Vector2d along_;
-  const double least_;
-  const Eigen::Array2d low_;
-  const Eigen::Array2d high_;
-};
-
-/** Best first, each segment at most once. */
-std::vector<SegmentMatch> oneToOne(std::vector<SegmentMatch> matches, std::size_t references, std::size_t currents)
-{
-  std::stable_sort(matches.begin(), matches.end(),
-                   [](const SegmentMatch& a, const SegmentMatch& b) { return a.share > b.share; });
-  std::vector<char> reference_used(references, 0);
-  std::vector<char> current_used(currents, 0);
-  std::vector<SegmentMatch> kept;
-  for (const SegmentMatch& match : matches)
-  {
-    char& reference = reference_used[static_cast<std::size_t>(match.reference)];
-    char& current = current_used[static_cast<std::size_t>(match.current)];
-    if (reference == 0 && current == 0)
-    {
-      reference = current = 1;
-      kept.push_back(match);
-    }
-  }
-  return kept;
-}
-
-/** Least-squares affine map of n >= 3 points; empty when it is degenerate, mirrors, or distorts beyond the limits. */
-std::optional<Eigen::Matrix3d> plausibleAffinity(const Eigen::Vector2d* from, const Eigen::Vector2d* to,
-                                                 const double* weights, int n)
-{
-  Eigen::Vector2d mean_from = Eigen::Vector2d::Zero();
-  Eigen::Vector2d mean_to = Eigen::Vector2d::Zero();
-  double sum = 0.0;
-  for (int i = 0; i < n; ++i)
-  {
-    mean_from += weights[i] * from[i];
-    mean_to += weights[i] * to[i];
-    sum += weights[i];
-  }
-  mean_from /= sum;
-  mean_to /= sum;
-  Eigen::Matrix2d spread = Eigen::Matrix2d::Zero();
-  Eigen::Matrix2d mixed = Eigen::Matrix2d::Zero();
-  for (int i = 0; i < n; ++i)
-  {
-    spread += weights[i] * (from[i] - mean_from) * (from[i] - mean_from).transpose();
-    mixed += weights[i] * (to[i] - mean_to) * (from[i] - mean_from).transpose();
-  }
-  constexpr double FLAT = 1e-3;  // of the squared trace
-  if (!(spread.determinant() > FLAT * spread.trace() * spread.trace()))
-  {
-    return std::nullopt;
-  }
-  Eigen::Matrix3d map = Eigen::Matrix3d::Identity();
-  map.topLeftCorner<2, 2>() = mixed * spread.inverse();
-  map.topRightCorner<2, 1>() = mean_to - map.topLeftCorner<2, 2>() * mean_from;
-  const double determinant = map.topLeftCorner<2, 2>().determinant();
-  // (s1² + s2²) / (s1 s2), about s1 / s2 when they differ.
-  const double anisotropy = map.topLeftCorner<2, 2>().squaredNorm() / determinant;
-  if (!(determinant > 1.0 / (MAX_SCALE_CHANGE * MAX_SCALE_CHANGE) &&
-        determinant < MAX_SCALE_CHANGE * MAX_SCALE_CHANGE && anisotropy < MAX_ANISOTROPY))
-  {
-    return std::nullopt;
-  }
-  return map;
-}
-
-/** Bilinear intensities of an 8-bit image. */
-class Sampler
-{
-public:
-  explicit Sampler(const cv::Mat& image)
-    : data_(image.data),
-      step_(image.step),
-      last_u_(static_cast<float>(image.cols - 1)),
-      last_v_(static_cast<float>(image.rows - 1))
-  {
-  }
-
-  bool contains(float u, float v) const
-  {
-    return u >= 0.0F && v >= 0.0F && u < last_u_ && v < last_v_;
-  }
-
-  float at(float u, float v) const
-  {
-    const int left = static_cast<int>(u);
-    const int top = static_cast<int>(v);
-    const float fu = u - static_cast<float>(left);
-    const float fv = v - static_cast<float>(top);
-    const unsigned char* p = data_ + static_cast<std::size_t>(top) * step_ + left;
-    const unsigned char* q = p + step_;
-    const float above = static_cast<float>(p[0]) + fu * static_cast<float>(p[1] - p[0]);
-    const float below = static_cast<float>(q[0]) + fu * static_cast<float>(q[1] - q[0]);
-    return above + fv * (below - above);
-  }
-
-private:
-  const unsigned char* data_;
-  std::size_t step_;
-  float last_u_;
-  float last_v_;
-};
 
 class RegionFinder
 {
@@ -386,7 +237,7 @@ private:
     const double along_current = b.current_along - a.current_along;
     const double scale = along_current / along;
     if (std::abs(along) < MIN_APART || std::abs(along_current) < MIN_APART ||
-        !(scale > 1.0 / MAX_SCALE_CHANGE && scale < MAX_SCALE_CHANGE))
+        !(scale > 1.0 / AFFINITY_LIMITS.scale_change && scale < AFFINITY_LIMITS.scale_change))
     {
       return std::nullopt;
     }
@@ -423,7 +274,7 @@ private:
       weights[2] = END_POINT_WEIGHT;
       n = 4;
     }
-    const auto map = plausibleAffinity(from, to, weights, n);
+    const auto map = plausibleAffinity(from, to, weights, n, AFFINITY_LIMITS);
     if (!map)
     {
       return std::nullopt;
@@ -432,8 +283,8 @@ private:
     for (const auto& [i, k] : { std::pair(candidate.row, candidate.column), std::pair(a.reference, a.current),
                                 std::pair(b.reference, b.current) })
     {
-      const double share =
-          Probe(mapped(*map, i), SLACK * params_.affine_tolerance, min_cosine_).agreement(current(k), to_.direction(k));
+      const double share = SegmentProbe(mapped(*map, i), SLACK * params_.affine_tolerance, min_cosine_)
+                               .agreement(current(k), to_.direction(k));
       if (share == 0.0)
       {
         return std::nullopt;
@@ -649,115 +500,6 @@ std::vector<Parameter> parameters(LineRegionParams& params)
 std::vector<std::string> LineRegionParams::validate() const
 {
   return faultsOf(*this);
-}
-
-std::vector<SegmentMatch> agreeingSegments(const Segments& reference, const std::vector<int>& of,
-                                           const LineFeatures& current, const Eigen::Matrix3d& h, double tolerance,
-                                           double max_angle_deg)
-{
-  const double min_cosine = std::cos(max_angle_deg * M_PI / 180.0);
-  std::vector<SegmentMatch> found;
-  std::vector<int> candidates;
-  for (const int i : of)
-  {
-    const auto mapped = transfer(h, reference[static_cast<std::size_t>(i)]);
-    if (!mapped)
-    {
-      continue;
-    }
-    const Probe probe(*mapped, tolerance, min_cosine);
-    current.alongside(*mapped, tolerance, max_angle_deg, candidates);
-    for (const int k : candidates)
-    {
-      const double share = probe.agreement(current.segment(k), current.direction(k));
-      if (share > 0.0)
-      {
-        found.push_back({ i, k, share });
-      }
-    }
-  }
-  return oneToOne(std::move(found), reference.size(), current.segments().size());
-}
-
-double sideCorrelation(const cv::Mat& reference, const cv::Mat& current, const Eigen::Matrix3d& h,
-                       const Segment& reference_segment, const Segment& current_segment)
-{
-  constexpr int ALONG = 16;
-  constexpr int ACROSS = 6;
-  constexpr float FIRST = 1.0F;     // distance of the samples from the segment [px]
-  constexpr float STEP = 1.5F;      // [px]
-  constexpr int MIN_SAMPLES = 30;   // of a side, within both images
-  constexpr float NOISE = 4.0F;     // variance of intensities that means nothing
-  constexpr float MIDDLE = 128.0F;  // keeps sums small
-  const auto mapped = transfer(h, reference_segment);
-  if (!mapped)
-  {
-    return 0.0;
-  }
-  // The part that both show, as fractions of the reference segment; what a homography does to fractions is neglected.
-  const Eigen::Vector2d direction = current_segment.direction();
-  const double start = (mapped->start - current_segment.start).dot(direction);
-  const double end = (mapped->end - current_segment.start).dot(direction);
-  const double length = current_segment.length();
-  const double first = std::clamp((std::clamp(start, 0.0, length) - start) / (end - start), 0.0, 1.0);
-  const double last = std::clamp((std::clamp(end, 0.0, length) - start) / (end - start), 0.0, 1.0);
-
-  // The homography is linear in the samples' homogeneous coordinates.
-  const Eigen::Vector2d along = reference_segment.end - reference_segment.start;
-  const Eigen::Vector2d normal = reference_segment.normal();
-  const Eigen::Vector3d start_there = h * reference_segment.start.homogeneous();
-  const Eigen::Vector3d along_there = h.leftCols<2>() * along;
-  const Eigen::Vector3d normal_there = h.leftCols<2>() * normal;
-  const Sampler from(reference);
-  const Sampler to(current);
-
-  double best = -1.0;
-  for (const double side : { -1.0, 1.0 })
-  {
-    float sum_a = 0.0F;
-    float sum_b = 0.0F;
-    float sum_aa = 0.0F;
-    float sum_bb = 0.0F;
-    float sum_ab = 0.0F;
-    int n = 0;
-    for (int i = 0; i < ALONG; ++i)
-    {
-      const double fraction = first + (last - first) * (i + 0.5) / ALONG;
-      const Eigen::Vector2f on_line = (reference_segment.start + fraction * along).cast<float>();
-      const Eigen::Vector3f on_line_there = (start_there + fraction * along_there).cast<float>();
-      const Eigen::Vector2f across = (side * normal).cast<float>();
-      const Eigen::Vector3f across_there = (side * normal_there).cast<float>();
-      for (int j = 0; j < ACROSS; ++j)
-      {
-        const float offset = FIRST + STEP * static_cast<float>(j);
-        const Eigen::Vector2f at = on_line + offset * across;
-        const Eigen::Vector3f seen = on_line_there + offset * across_there;
-        const float scale = 1.0F / seen.z();
-        const Eigen::Vector2f there = scale * seen.head<2>();
-        if (!(seen.z() > 0.0F) || !from.contains(at.x(), at.y()) || !to.contains(there.x(), there.y()))
-        {
-          continue;
-        }
-        const float a = from.at(at.x(), at.y()) - MIDDLE;
-        const float b = to.at(there.x(), there.y()) - MIDDLE;
-        sum_a += a;
-        sum_b += b;
-        sum_aa += a * a;
-        sum_bb += b * b;
-        sum_ab += a * b;
-        ++n;
-      }
-    }
-    if (n >= MIN_SAMPLES)
-    {
-      const float samples = static_cast<float>(n);
-      const float variance_a = sum_aa / samples - sum_a / samples * (sum_a / samples);
-      const float variance_b = sum_bb / samples - sum_b / samples * (sum_b / samples);
-      const float covariance = sum_ab / samples - sum_a / samples * (sum_b / samples);
-      best = std::max<double>(best, covariance / std::sqrt((variance_a + NOISE) * (variance_b + NOISE)));
-    }
-  }
-  return best;
 }
 
 std::vector<LineRegion> findLineRegions(const LineFeatures& reference, const LineFeatures& current,

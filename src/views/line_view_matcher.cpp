@@ -3,6 +3,7 @@
 #include "view_servo/views/line_view_matcher.h"
 
 #include "stage_clock.h"
+#include "view_servo/features/side_correlation.h"
 #include "view_servo/geometry/fundamental.h"
 #include "view_servo/geometry/homography.h"
 #include "view_servo/geometry/line_homography.h"

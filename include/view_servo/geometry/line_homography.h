@@ -39,6 +39,21 @@ std::optional<Eigen::Matrix3d> homographyFromLines(const SegmentPairs& pairs);
 /** The same for an affine map: n >= 3 lines. */
 std::optional<Eigen::Matrix3d> affinityFromLines(const SegmentPairs& pairs);
 
+/** How much a local affine map may distort; s1 >= s2 are the singular values of its linear part. */
+struct AffinityLimits
+{
+  double scale_change = 5.0;  ///< most that lengths grow or shrink, as the mean sqrt(s1 s2) of all directions, > 1
+  double anisotropy = 6.0;    ///< largest (s1² + s2²) / (s1 s2): about s1 / s2 when the two differ much, > 2
+};
+
+/**
+ * Weighted least-squares affine map of n >= 3 points: intersections of lines, or end points of segments. Third row (0, 0, 1).
+ * @param from, to, weights arrays of n [px]. @return x_to = A x_from; empty when the points `from` are nearly collinear, or
+ * when the map mirrors or distorts more than the limits allow.
+ */
+std::optional<Eigen::Matrix3d> plausibleAffinity(const Eigen::Vector2d* from, const Eigen::Vector2d* to,
+                                                 const double* weights, int n, const AffinityLimits& limits);
+
 /** The segment mapped by H; empty when an end point maps near or beyond infinity (third coordinate < 0.1). */
 std::optional<Segment> transfer(const Eigen::Matrix3d& h, const Segment& segment);
 

@@ -2,13 +2,11 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-#include "view_servo/geometry/line_segment.h"
 #include "view_servo/matching/association.h"
 #include "view_servo/matching/line_features.h"
 #include "view_servo/parameters/parameter.h"
 
 #include <Eigen/Core>
-#include <opencv2/core/mat.hpp>
 
 #include <optional>
 #include <string>
@@ -58,21 +56,6 @@ struct LineRegion
   std::vector<SegmentMatch> matches;
   double support;  ///< sum over the matches of (0.3 + 0.7 share) x correlation
 };
-
-/**
- * The one-to-one matches that agree with a homography among the reference segments `of` and all current ones: across
- * within `tolerance` [px], within `max_angle_deg`, side by side for a third of the shorter. Best share first.
- */
-std::vector<SegmentMatch> agreeingSegments(const Segments& reference, const std::vector<int>& of,
-                                           const LineFeatures& current, const Eigen::Matrix3d& h, double tolerance,
-                                           double max_angle_deg);
-
-/**
- * Zero-mean normalised correlation of the intensities on one side of a segment, warped by a homography, with the current
- * image: the larger of the two sides', since one may be background. In [-1, 1]; flat intensities give nearly 0.
- */
-double sideCorrelation(const cv::Mat& reference, const cv::Mat& current, const Eigen::Matrix3d& h,
-                       const Segment& reference_segment, const Segment& current_segment);
 
 /**
  * Regions, in the order they were found (strongest votes first). Each candidate match is tried with those neighbours

@@ -7,8 +7,10 @@
 
 #include <Eigen/Core>
 #include <opencv2/core/mat.hpp>
+#include <opencv2/core/types.hpp>
 
 #include <limits>
+#include <memory>
 #include <string>
 #include <vector>
 
@@ -73,68 +75,13 @@ public:
    */
   TrackedHomography track(const cv::Mat& current, const Eigen::Matrix3d& predicted) const;
 
-  /** The corners [px], strongest first. */
-  const std::vector<Eigen::Vector2d>& points() const
-  {
-    return points_;
-  }
+  /** The corners of the stored view that are looked for [px], strongest first. */
+  const Points& points() const;
 
 private:
-  /** Coordinates about the middle of some points and of the order of 1: x = (pixel - middle) / spread. */
-  struct Centring
-  {
-    Eigen::Vector2d middle = Eigen::Vector2d::Zero();  // [px]
-    double spread = 1.0;                               // [px]
-  };
+  class Impl;
 
-  /** A part of the stored view that is all of one light, and what its alignment needs. */
-  struct Block
-  {
-    Eigen::Vector2d at;             // its middle
-    float norm = 0.0F;              // of its grey values without their mean
-    std::vector<float> values;      // zero mean, unit norm
-    std::vector<float> gradient_u;  // of these
-    std::vector<float> gradient_v;
-    Eigen::Matrix<double, 8, 8> information;  // of a homography near the identity, for grey values
-  };
-
-  /** A patch of one level, normalised, with what its alignment needs. */
-  struct Patch
-  {
-    bool usable = false;
-    int radius = 0;
-    Eigen::Matrix2d information;   // of its position [1/px²]
-    std::vector<float> values;     // zero mean, unit norm
-    std::vector<float> descent_u;  // inverse information times the gradient of the normalised values
-    std::vector<float> descent_v;
-  };
-
-  /** Where a homography puts a patch, and where it is. */
-  struct Alignment
-  {
-    Eigen::Vector2d at;     // in the level of the stored view
-    Eigen::Vector2d shift;  // what the homography shows at `at` is the stored view at `at` + `shift`
-    Eigen::Vector2d found;  // in the level of the current image
-    double correlation;
-    const Patch* patch;
-  };
-
-  /** Down from a level. */
-  TrackedHomography trackFrom(const std::vector<cv::Mat>& pyramid, const Eigen::Matrix3d& predicted,
-                              int coarsest) const;
-  std::vector<Alignment> alignAll(const cv::Mat& current, std::size_t level, const Eigen::Matrix3d& h, int iterations,
-                                  int& looked_for) const;
-  static bool align(const cv::Mat& current, const Patch& patch, const Eigen::Matrix3d& h, int iterations,
-                    Alignment& alignment);
-  static Patch makePatch(const cv::Mat& image, const Eigen::Vector2d& at, int radius);
-  void makeBlocks(const cv::Mat& image, const cv::Rect& region);
-  Eigen::Matrix3d refine(const cv::Mat& current, const Eigen::Matrix3d& h) const;
-
-  HomographyAlignerParams params_;
-  std::vector<Eigen::Vector2d> points_;      // pixels of the full image
-  std::vector<std::vector<Patch>> patches_;  // of levels, of points
-  std::vector<Block> blocks_;                // side by side over the region
-  Centring centring_;
+  std::shared_ptr<const Impl> impl_;  // copies share it: it does not change
 };
 
 }  // namespace view_servo
