@@ -20,12 +20,7 @@ namespace
 /**
  * What SimulationNode needs to know of the base.
  *
- * Parameters:
- *  - `~odometry_drift` (double, default 0): by which part odometry measures distances too long;
- *  - `~odometry_turn_drift` (double, default 0 [rad/m]): turn that odometry adds;
- *  - `~odometry_noise` (double, default 0): standard deviation of each cycle's measured motion, as a part of it;
- *  - `~max_speed` (double, default 0.5 [m/s]), `~max_turn_rate` (double, default 1 [rad/s]), `~max_acceleration`
- *    (double, default 1 [m/s²]), `~max_turn_acceleration` (double, default 2 [rad/s²]).
+ * Parameters: see NomadParams.
  *
  * Subscribes:
  *  - `cmd_vel` (geometry_msgs/Twist): linear.x, linear.y and angular.z, in base_link.
@@ -37,23 +32,9 @@ class NomadInterface
 {
 public:
   using Robot = NomadRobot;
+  using Params = NomadParams;
   using Command = geometry_msgs::Twist;
   static constexpr RobotKind KIND = RobotKind::NOMAD;
-
-  struct Params : NomadParams
-  {
-    void read(ParameterReader& reader)
-    {
-      reader.read("odometry_drift", odometry_drift);
-      reader.read("odometry_turn_drift", odometry_turn_drift);
-      reader.read("odometry_noise", odometry_noise);
-      reader.read("max_speed", max_speed);
-      reader.read("max_turn_rate", max_turn_rate);
-      reader.read("max_acceleration", max_acceleration);
-      reader.read("max_turn_acceleration", max_turn_acceleration);
-      reader.addFaults(validate());
-    }
-  };
 
   static std::unique_ptr<NomadRobot> makeRobot(const World& world, const Params& params, const ros::NodeHandle& /*nh*/)
   {

@@ -39,10 +39,7 @@ std::string robotDescription(const ros::NodeHandle& nh)
 /**
  * What SimulationNode needs to know of the arm. The URDF comes from `robot_description`, else from the package.
  *
- * Parameters:
- *  - `~encoder_noise` (double, default 0 [rad]): standard deviation of each reading;
- *  - `~hand_eye_translation_error` (double, default 0 [m]), `~hand_eye_rotation_error` (double, default 0 [rad]): how
- *    far the true camera is from where the URDF has it, in directions that `~seed` determines.
+ * Parameters: see PumaParams.
  *
  * Subscribes:
  *  - `cmd_vel` (geometry_msgs/TwistStamped): twist of the camera in its optical frame; another frame_id is refused.
@@ -54,19 +51,9 @@ class PumaInterface
 {
 public:
   using Robot = PumaRobot;
+  using Params = PumaParams;
   using Command = geometry_msgs::TwistStamped;
   static constexpr RobotKind KIND = RobotKind::PUMA;
-
-  struct Params : PumaParams
-  {
-    void read(ParameterReader& reader)
-    {
-      reader.read("encoder_noise", encoder_noise);
-      reader.read("hand_eye_translation_error", hand_eye_translation_error);
-      reader.read("hand_eye_rotation_error", hand_eye_rotation_error);
-      reader.addFaults(validate());
-    }
-  };
 
   static std::unique_ptr<PumaRobot> makeRobot(const World& world, const Params& params, const ros::NodeHandle& nh)
   {

@@ -3,6 +3,7 @@
 #include "sim/arm_kinematics.h"
 
 #include "view_servo/parameters/faults.h"
+#include "view_servo/parameters/parameter.h"
 #include "view_servo/robust/random.h"
 
 #include <console_bridge/console.h>
@@ -167,18 +168,16 @@ bool samePose(const Eigen::Isometry3d& a, const Eigen::Isometry3d& b)
 
 std::vector<std::string> ArmKinematicsParams::validate() const
 {
-  std::vector<std::string> faults;
-  const auto require = [&](bool right, const char* fault) {
-    if (!right)
-    {
-      faults.emplace_back(fault);
-    }
-  };
-  require(!base_link.empty(), "base_link must not be empty");
-  require(!camera_frame.empty(), "camera_frame must not be empty");
-  require(damping >= 0.0 && std::isfinite(damping), "damping must not be negative");
-  require(min_manipulability > 0.0 && std::isfinite(min_manipulability), "min_manipulability must be positive");
-  return faults;
+  ArmKinematicsParams copy = *this;
+  Faults faults;
+  faults.require(!base_link.empty(), "base_link must not be empty");
+  faults.require(!camera_frame.empty(), "camera_frame must not be empty");
+  faults.add(faultsOf({
+      real("damping", copy.damping, "", ">= 0", "damping of the inverse at a singularity"),
+      real("min_manipulability", copy.min_manipulability, "", "> 0",
+           "smallest singular value of the Jacobian that needs no damping"),
+  }));
+  return faults.list();
 }
 
 struct ArmKinematics::Chain

@@ -35,24 +35,24 @@ Eigen::Isometry3d toIsometry(const Eigen::Vector3d& pose)
 
 }  // namespace
 
+std::vector<Parameter> parameters(NomadParams& params)
+{
+  return {
+    real("max_speed", params.max_speed, "m/s", "> 0", "largest speed"),
+    real("max_turn_rate", params.max_turn_rate, "rad/s", "> 0", "largest turn rate"),
+    real("max_acceleration", params.max_acceleration, "m/s^2", "> 0", "largest change of the velocity"),
+    real("max_turn_acceleration", params.max_turn_acceleration, "rad/s^2", "> 0", "largest change of the turn rate"),
+    real("radius", params.radius, "m", "> 0", "radius of the outline on the floor"),
+    real("odometry_drift", params.odometry_drift, "", "> -1", "distance measured too long, as a part of it"),
+    real("odometry_turn_drift", params.odometry_turn_drift, "rad/m", "", "turn that odometry adds to a distance"),
+    real("odometry_noise", params.odometry_noise, "", ">= 0",
+         "standard deviation of the measured motion, as a part of it"),
+  };
+}
+
 std::vector<std::string> NomadParams::validate() const
 {
-  std::vector<std::string> faults;
-  const auto require = [&faults](bool condition, const char* fault) {
-    if (!condition)
-    {
-      faults.emplace_back(fault);
-    }
-  };
-  require(max_speed > 0.0, "max_speed must be more than 0 m/s");
-  require(max_turn_rate > 0.0, "max_turn_rate must be more than 0 rad/s");
-  require(max_acceleration > 0.0, "max_acceleration must be more than 0 m/s^2");
-  require(max_turn_acceleration > 0.0, "max_turn_acceleration must be more than 0 rad/s^2");
-  require(radius > 0.0, "radius must be more than 0 m");
-  require(odometry_drift > -1.0 && std::isfinite(odometry_drift), "odometry_drift must be more than -1");
-  require(std::isfinite(odometry_turn_drift), "odometry_turn_drift must be finite");
-  require(odometry_noise >= 0.0 && std::isfinite(odometry_noise), "odometry_noise must be at least 0");
-  return faults;
+  return faultsOf(*this);
 }
 
 Nomad::Nomad(const World& world, const NomadParams& params)

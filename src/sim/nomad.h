@@ -3,6 +3,7 @@
 #pragma once
 
 #include "sim/world.h"
+#include "view_servo/parameters/parameter.h"
 #include "view_servo/robust/random.h"
 
 #include <Eigen/Core>
@@ -30,6 +31,9 @@ struct NomadParams
   /** All faults, one a line; empty when the parameters are usable. */
   std::vector<std::string> validate() const;
 };
+
+/** Names, units and ranges of these parameters, by which validate() checks them. */
+std::vector<Parameter> parameters(NomadParams& params);
 
 /**
  * A holonomic base like the Nomad 200: it moves in any direction without turning, and turns. Poses are on the floor.

@@ -31,25 +31,24 @@ Eigen::Vector3d randomDirection(Rng& rng)
 
 }  // namespace
 
+std::vector<Parameter> parameters(PumaParams& params)
+{
+  return {
+    real("max_joint_acceleration", params.max_joint_acceleration, "rad/s^2", "> 0", "largest acceleration of a joint"),
+    real("encoder_noise", params.encoder_noise, "rad", ">= 0", "standard deviation of each reading of a joint"),
+    real("hand_eye_translation_error", params.hand_eye_translation_error, "m", ">= 0",
+         "how far the true camera is from where the URDF has it"),
+    real("hand_eye_rotation_error", params.hand_eye_rotation_error, "rad", "[0, pi]",
+         "angle by which the true camera is turned against the URDF"),
+  };
+}
+
 std::vector<std::string> PumaParams::validate() const
 {
-  std::vector<std::string> faults = ArmKinematicsParams::validate();
-  const auto require = [&](bool right, const char* fault) {
-    if (!right)
-    {
-      faults.emplace_back(fault);
-    }
-  };
-  const auto not_negative = [](double value) {
-    return value >= 0.0 && std::isfinite(value);
-  };
-  require(max_joint_acceleration > 0.0 && std::isfinite(max_joint_acceleration),
-          "max_joint_acceleration must be positive");
-  require(not_negative(encoder_noise), "encoder_noise must not be negative");
-  require(not_negative(hand_eye_translation_error), "hand_eye_translation_error must not be negative");
-  require(hand_eye_rotation_error >= 0.0 && hand_eye_rotation_error <= M_PI,
-          "hand_eye_rotation_error must lie in [0, pi]");
-  return faults;
+  Faults faults;
+  faults.add(ArmKinematicsParams::validate());
+  faults.add(faultsOf(*this));
+  return faults.list();
 }
 
 Puma::Puma(const std::string& urdf_xml, const PumaParams& params)

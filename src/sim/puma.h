@@ -3,6 +3,7 @@
 #pragma once
 
 #include "sim/arm_kinematics.h"
+#include "view_servo/parameters/parameter.h"
 #include "view_servo/robust/random.h"
 
 #include <Eigen/Core>
@@ -27,6 +28,9 @@ struct PumaParams : ArmKinematicsParams
   /** All faults, one a line; empty when the parameters are usable. */
   std::vector<std::string> validate() const;
 };
+
+/** Names, units and ranges of those of these parameters that are not the kinematics'. */
+std::vector<Parameter> parameters(PumaParams& params);
 
 /**
  * A Puma 560 that follows twists of its camera. ArmKinematics turns them into joint velocities, which are scaled down

@@ -399,15 +399,17 @@ inline int runSimulation(int argc, char** argv, const std::string& name, const s
   try
   {
     ParameterReader reader(ros::NodeHandle("~"));
-    reader.read("world", params.world);
-    reader.read("start", params.start);
-    reader.read("view", params.view);
-    reader.read("timeout", params.timeout);
-    reader.require(params.timeout > 0.0, "~timeout must be positive [s]");
-    reader.read("patience", params.patience);
-    reader.require(params.patience > 0.0, "~patience must be positive [s]");
-    reader.read("result", result_file);
-    reader.read("exit", exit);
+    const std::vector<Parameter> table{
+      text("world", params.world, "a world's file, or the name of one in config/worlds/"),
+      text("start", params.start, "where the robot starts, one of the world's starts"),
+      text("view", params.view, "name under which the view is stored"),
+      real("timeout", params.timeout, "s", "> 0", "time limit of the goal"),
+      real("patience", params.patience, "s", "> 0", "longest wait for another node"),
+      text("result", result_file, "file that the outcome is written to; empty: none"),
+      boolean("exit", exit, "whether the program ends after the run, and roslaunch with it"),
+    };
+    reader.read(table);
+    reader.addFaults(faultsOf(table));
     reader.finish();
     outcome = run(nh, sim::findWorld(params.world, ros::package::getPath("view_servo") + "/config/worlds"), params);
   }

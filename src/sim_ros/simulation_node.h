@@ -42,26 +42,10 @@ struct SimulationParams
   std::string world = "desk";
   std::string start;
   std::string groups;
-  int seed = 1;
+  std::uint64_t seed = 1;
   double image_noise = -1.0;
   double focal_length_error = 0.0;
   double control_rate = 50.0;
-
-  void read(ParameterReader& reader)
-  {
-    reader.read("world", world);
-    reader.read("start", start);
-    reader.read("groups", groups);
-    reader.read("seed", seed);
-    reader.read("image_noise", image_noise);
-    reader.read("focal_length_error", focal_length_error);
-    reader.read("control_rate", control_rate);
-    reader.require(seed >= 0, "~seed must not be negative");
-    reader.require(std::isfinite(image_noise), "~image_noise must be finite");
-    reader.require(focal_length_error > -0.5 && focal_length_error < 0.5,
-                   "~focal_length_error must lie in (-0.5, 0.5)");
-    reader.require(control_rate >= 10.0 && control_rate <= 1000.0, "~control_rate must lie in [10, 1000] Hz");
-  }
 
   /**
    * Reads the world, and gives its camera the noise asked for. @throws std::invalid_argument when it is for another
@@ -90,18 +74,26 @@ struct SimulationParams
   }
 };
 
+/** Names, units, ranges and meanings of these parameters. */
+inline std::vector<Parameter> parameters(SimulationParams& params)
+{
+  return {
+    text("world", params.world, "a world's file, or the name of one in config/worlds/"),
+    text("start", params.start, "where to begin, one of the world's starts; empty: its goal"),
+    text("groups", params.groups, "groups of surfaces to show, separated by commas"),
+    natural("seed", params.seed, "of all noise"),
+    real("image_noise", params.image_noise, "grey levels", "", "standard deviation; negative: the world's"),
+    real("focal_length_error", params.focal_length_error, "", "(-0.5, 0.5)",
+         "part by which the focal lengths in camera_info are too long"),
+    real("control_rate", params.control_rate, "Hz", "[10, 1000]",
+         "rate at which the robot moves and publishes its state"),
+  };
+}
+
 /**
  * The node of a simulated robot that carries a camera. It runs on wall time.
  *
- * Parameters, all private:
- *  - `~world` (string, default "desk"): a world file, or the name of one in `config/worlds/`;
- *  - `~start` (string, default ""): where to begin, one of the world's starts; "" = its goal;
- *  - `~groups` (string, default ""): groups of surfaces to show, separated by commas;
- *  - `~seed` (int, default 1): of all noise;
- *  - `~image_noise` (double, default -1 [grey levels]): standard deviation; negative = the world's;
- *  - `~focal_length_error` (double, default 0): by which part the focal lengths in `camera_info` are too long;
- *  - `~control_rate` (double, default 50 [Hz]): rate at which the robot moves and publishes its state;
- *  - those of the robot.
+ * Its private parameters are those of SimulationParams and of the robot.
  *
  * Publishes:
  *  - `camera/image_raw` (sensor_msgs/Image, mono8; drawn only when somebody listens), `camera/camera_info`, at the
@@ -120,8 +112,8 @@ struct SimulationParams
  * The camera draws in a thread of its own, since that takes longer than a cycle of control.
  *
  * An Interface is how one kind of robot is reached over ROS. It has
- *  - the types `Robot` (a sim::Robot), `Command` (the message on `cmd_vel`) and `Params`, the robot's parameters with
- *    `seed` and `read(ParameterReader&)`; and the constant `KIND`;
+ *  - the types `Robot` (a sim::Robot), `Command` (the message on `cmd_vel`) and `Params`, the robot's parameters, with
+ *    `seed`, their table parameters(Params&) and validate(); and the constant `KIND`;
  *  - `static std::unique_ptr<Robot> makeRobot(world, params, node_handle)`;
  *  - a constructor from the robot and a node handle, which advertises;
  *  - `static std::optional<Robot::Twist> toTwist(command)`, empty when the command must be refused;
@@ -140,13 +132,15 @@ public:
       throw std::runtime_error("/use_sim_time is set, but simulated robots run on wall time");
     }
     ParameterReader reader(private_nh_);
-    params_.read(reader);
     typename Interface::Params robot_params;
-    robot_params.seed = static_cast<std::uint64_t>(params_.seed);
-    robot_params.read(reader);
+    reader.read(parameters(params_));
+    reader.read(parameters(robot_params));
+    reader.addFaults(faultsOf(params_));
+    reader.addFaults(robot_params.validate());
     reader.finish();
+    robot_params.seed = params_.seed;
     world_ = params_.load(Interface::KIND);
-    camera_ = std::make_unique<SimulatedCamera>(world_, params_.groupNames(), static_cast<std::uint64_t>(params_.seed));
+    camera_ = std::make_unique<SimulatedCamera>(world_, params_.groupNames(), params_.seed);
     robot_ = Interface::makeRobot(world_, robot_params, nh_);
     interface_ = std::make_unique<Interface>(*robot_, nh_);
     robot_->setPose(world_.goal);
