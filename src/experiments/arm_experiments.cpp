@@ -1,12 +1,13 @@
 // Copyright (c) 2026, the view_servo authors
 // SPDX-License-Identifier: BSD-3-Clause
-#include "arm_experiments.h"
+#include "experiments/arm_experiments.h"
 
-#include "input_file.h"
-#include "tools/package_folder.h"
-#include "parallel.h"
-#include "trials/arm_trial.h"
+#include "experiments/input_file.h"
+#include "experiments/parallel.h"
+#include "experiments/statistics.h"
 #include "sim/world_reader.h"
+#include "tools/package_folder.h"
+#include "trials/arm_trial.h"
 #include "view_servo/robust/random.h"
 
 #include <Eigen/Geometry>
@@ -21,7 +22,6 @@
 #include <iterator>
 #include <map>
 #include <mutex>
-#include <numeric>
 #include <sstream>
 #include <string>
 #include <vector>
@@ -41,28 +41,24 @@ struct Run
   std::string start;
   int index;  ///< of the runs from this start
   bool other_light;
+  std::uint64_t seed;
 };
 
-/** What a table's row sums up. */
+/** What a row of the printed table sums up. */
 struct Row
 {
   int runs = 0;
   int failures = 0;
-  int wrong = 0;  ///< converged, it says, and is not
+  int wrong = 0;  ///< servoing says that it has converged, and it has not
   std::vector<double> millimetres;
   std::vector<double> degrees;
 };
 
-std::uint64_t seedOf(const Run& run)
-{
-  return static_cast<std::uint64_t>(run.index) + 1;
-}
-
 sim::ArmTrialParams paramsOf(const Run& run, const sim::World& world)
 {
-  Rng rng(seedOf(run));
+  Rng rng(run.seed);
   sim::ArmTrialParams params;
-  params.seed = seedOf(run);
+  params.seed = run.seed;
   params.conditions.image_noise = 2.0;
   params.conditions.encoder_noise = 1e-4;
   params.conditions.hand_eye_translation_error = 0.002;
@@ -82,12 +78,12 @@ sim::ArmTrialParams paramsOf(const Run& run, const sim::World& world)
   return params;
 }
 
-/** A few millimetres and degrees beside a world's start: no two runs are the same. */
+/** A few millimetres and degrees beside a world's start, other ones for each run. */
 Eigen::Isometry3d startOf(const Run& run, const sim::World& world)
 {
   constexpr double LENGTH = 0.01;               // [m]
   constexpr double ANGLE = 1.5 * M_PI / 180.0;  // [rad]
-  Rng rng(1000 + seedOf(run));
+  Rng rng(1000 + run.seed);
   const auto vector = [&rng](double size) {
     const double x = uniform(rng, -size, size);
     const double y = uniform(rng, -size, size);
@@ -98,28 +94,13 @@ Eigen::Isometry3d startOf(const Run& run, const sim::World& world)
          Eigen::AngleAxisd(turn.norm(), turn.normalized());
 }
 
-double mean(const std::vector<double>& values)
-{
-  return std::accumulate(values.begin(), values.end(), 0.0) / static_cast<double>(values.size());
-}
-
-double deviation(const std::vector<double>& values)
-{
-  double squares = 0.0;
-  for (const double value : values)
-  {
-    squares += (value - mean(values)) * (value - mean(values));
-  }
-  return std::sqrt(squares / static_cast<double>(values.size()));
-}
-
 }  // namespace
 
 void runArmExperiment(const ExperimentContext& context, std::ostream& csv)
 {
   constexpr double NEAR_ENOUGH = 0.005;              // [m]: what says converged and is further off is wrong
   constexpr double STRAIGHT_ENOUGH = 0.5 / DEGREES;  // [rad]
-  const int runs_each = context.brief ? 2 : 20;
+  const int runs_each = context.runsOf(ARM_RUNS);
   std::ifstream urdf_file = openForReading(packageFolder() / "urdf" / "puma560.urdf");
   const std::string urdf{ std::istreambuf_iterator<char>(urdf_file), std::istreambuf_iterator<char>() };
   std::map<std::string, sim::World> worlds;
@@ -131,7 +112,7 @@ void runArmExperiment(const ExperimentContext& context, std::ostream& csv)
     {
       for (int i = 0; i < runs_each; ++i)
       {
-        runs.push_back({ world, start, i, i % 2 == 1 });
+        runs.push_back({ world, start, i, i % 2 == 1, context.seedOf(ARM_RUNS, static_cast<std::uint64_t>(i) + 1) });
       }
     }
   }

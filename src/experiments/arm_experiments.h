@@ -2,17 +2,21 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-#include "experiment_context.h"
+#include "experiments/experiment_context.h"
 
 #include <ostream>
 
 namespace view_servo
 {
+/** Runs from each of the six starts. */
+constexpr Repetition ARM_RUNS{ "runs from each start", 20, 2, 1 };
+
 /**
- * Table 8.1: 2.5D servoing of the simulated arm to two views, from three starts each, the third among things that were not
- * there when the view was stored; 20 runs a start, ten under the light of the stored view and ten under another. Image noise
- * of 2 grey levels, encoder noise of 0.1 mrad, hand-eye wrong by 2 mm and 0.5 degrees, focal length 0.5 % long; each run with
- * its own noise and its own few millimetres and degrees of start.
+ * Table 8.1 of the thesis: 2.5D servoing of the simulated arm to two views, from three starts each. At the third start
+ * there are things that were not there when the view was stored. Every second run has another light than the stored
+ * view. All runs have image noise of 2 grey levels, encoder noise of 0.1 mrad, a hand-eye calibration that is off by 2
+ * mm and 0.5 degrees, and a focal length that is 0.5 % too long; each starts some millimetres and degrees beside the
+ * start, with noise of its own.
  */
 void runArmExperiment(const ExperimentContext& context, std::ostream& csv);
 

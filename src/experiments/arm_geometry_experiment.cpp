@@ -1,8 +1,8 @@
 // Copyright (c) 2026, the view_servo authors
 // SPDX-License-Identifier: BSD-3-Clause
-#include "arm_geometry_experiment.h"
+#include "experiments/arm_geometry_experiment.h"
 
-#include "input_file.h"
+#include "experiments/input_file.h"
 #include "view_servo/geometry/camera.h"
 #include "view_servo/geometry/correspondence.h"
 #include "view_servo/geometry/euclidean_homography.h"
@@ -148,7 +148,8 @@ ArmData readArmData(const fs::path& folder)
 }
 
 /**
- * The corners without the distortion that the file of the camera leaves out: radial, from the squares of the board alone.
+ * The corners without the distortion that the file of the camera leaves out: radial, from the squares of the board
+ * alone.
  * @return the root mean square distance of the corners from where the board is seen then [px].
  */
 double removeDistortion(ArmData& data)
@@ -280,7 +281,9 @@ Eigen::Vector3d meanNormal(const std::vector<Comparison>& comparisons, const Eig
 /** The error of 2.5D servoing, of a point: x - x*, y - y* (normalised), log(Z / Z*), rotation vector [rad]. */
 using ServoError = Eigen::Matrix<double, 6, 1>;
 
-/** @param current the point in the current camera, @param reference in the reference one, of the same unit of length. */
+/**
+ * @param current the point in the current camera, @param reference in the reference one, of the same unit of length.
+ */
 ServoError servoError(const Eigen::Vector3d& current, const Eigen::Vector3d& reference, const Eigen::Matrix3d& rotation)
 {
   const Eigen::AngleAxisd turn(rotation);

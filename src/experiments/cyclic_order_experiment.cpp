@@ -1,16 +1,17 @@
 // Copyright (c) 2026, the view_servo authors
 // SPDX-License-Identifier: BSD-3-Clause
-#include "cyclic_order_experiment.h"
+#include "experiments/cyclic_order_experiment.h"
 
-#include "line_ground_truth.h"
-#include "point_pairs.h"
+#include "experiments/line_ground_truth.h"
+#include "experiments/point_pairs.h"
 #include "sim/textures.h"
-#include "view_servo/views/prepared_image.h"
 #include "view_servo/views/point_view_matcher.h"
+#include "view_servo/views/prepared_image.h"
 
 #include <opencv2/core.hpp>
 #include <opencv2/imgproc.hpp>
 
+#include <algorithm>
 #include <cmath>
 #include <cstdint>
 #include <filesystem>
@@ -28,7 +29,7 @@ namespace fs = std::filesystem;
 
 constexpr double NOT_A_NUMBER = std::numeric_limits<double>::quiet_NaN();
 
-/** A picture for the surface: drawn, or of oxford_affine. */
+/** A picture on a surface: a drawn one, or one of oxford_affine. */
 struct Picture
 {
   Surface surface;
@@ -36,7 +37,7 @@ struct Picture
   cv::Mat image;
 };
 
-/** Pictures side by side, for a cylinder's way round. */
+/** Pictures side by side, to go all around a cylinder. */
 cv::Mat sideBySide(const std::vector<cv::Mat>& images)
 {
   constexpr int HEIGHT = 560;  // [px]
@@ -51,21 +52,28 @@ cv::Mat sideBySide(const std::vector<cv::Mat>& images)
   return row;
 }
 
-/** Each on a plane, and four of a kind around a cylinder. */
-std::vector<Picture> drawnPictures(bool brief)
+/** Drawn pictures of two kinds, some of each on planes, and four of each together around a cylinder. */
+std::vector<Picture> drawnPictures(const ExperimentContext& context)
 {
   constexpr double GREY = 128.0;
   constexpr int COUNT = 10;  // of what is drawn
+  constexpr int AROUND_CYLINDER = 4;
+  const int on_planes = context.runsOf(DRAWN_PICTURES);
   std::vector<Picture> pictures;
   for (const char* kind : { "poster", "print" })
   {
     std::vector<cv::Mat> all;
-    for (std::uint64_t seed = 1; seed <= 4; ++seed)
+    for (int i = 1; i <= std::max(on_planes, AROUND_CYLINDER); ++i)
     {
-      all.push_back(sim::drawTexture(kind, cv::Size(900, 720), GREY, COUNT, seed));
-      if (seed <= (brief ? 1U : 2U))
+      const std::uint64_t seed = context.seedOf(DRAWN_PICTURES, static_cast<std::uint64_t>(i));
+      const cv::Mat image = sim::drawTexture(kind, cv::Size(900, 720), GREY, COUNT, seed);
+      if (i <= on_planes)
       {
-        pictures.push_back({ Surface::PLANE, kind + std::to_string(seed), all.back() });
+        pictures.push_back({ Surface::PLANE, kind + std::to_string(i), image });
+      }
+      if (i <= AROUND_CYLINDER)
+      {
+        all.push_back(image);
       }
     }
     pictures.push_back({ Surface::CYLINDER, kind, sideBySide(all) });
@@ -73,7 +81,7 @@ std::vector<Picture> drawnPictures(bool brief)
   return pictures;
 }
 
-/** The first images of the sequences, as above. */
+/** The first images of the sequences: each on a plane, and all together around a cylinder. */
 std::vector<Picture> oxfordPictures(const fs::path& data)
 {
   std::vector<Picture> pictures;
@@ -87,7 +95,7 @@ std::vector<Picture> oxfordPictures(const fs::path& data)
   return pictures;
 }
 
-/** What both orders have in common. */
+/** Parameters for which both orders are compared. */
 struct OrderSetting
 {
   std::string name;
@@ -95,10 +103,11 @@ struct OrderSetting
 };
 
 /** The defaults, and the thesis' values (7.4; N_f as in 6.2.1), which take ten times as long. */
-std::vector<OrderSetting> orderSettings(bool brief)
+std::vector<OrderSetting> orderSettings(const ExperimentContext& context)
 {
   OrderSetting ours{ "default", {} };
   ours.params.view_consistency = ViewConsistency::OFF;
+  ours.params.seed = context.seedOf(DRAWN_PICTURES, ours.params.seed);
   ours.params.guided = false;
   ours.params.scale_search = false;
   ours.params.first_share = 1.0;  // so that both orders look at the same profiles
@@ -108,7 +117,7 @@ std::vector<OrderSetting> orderSettings(bool brief)
   thesis.params.points.profiles.coefficients = 6;
   thesis.params.points.search.neighbours = 25;
   thesis.params.points.cyclic_entries = 0;
-  return brief ? std::vector<OrderSetting>{ ours } : std::vector<OrderSetting>{ ours, thesis };
+  return context.brief ? std::vector<OrderSetting>{ ours } : std::vector<OrderSetting>{ ours, thesis };
 }
 
 /** Matches a pair with and without cyclic order, a row each. `view` says which of a series it is. */
@@ -156,14 +165,14 @@ void runCyclicOrderExperiment(const ExperimentContext& context, std::ostream& cs
   const std::vector<int> cylinder_angles = { 30, 45, 60, 70, 80, 90 };  // what both see shrinks, too
   cv::setNumThreads(context.threads > 0 ? context.threads : -1);
   const std::optional<fs::path> data = context.brief ? std::nullopt : dataFolder();
-  std::vector<Picture> pictures = drawnPictures(context.brief);
+  std::vector<Picture> pictures = drawnPictures(context);
   if (data)
   {
     const std::vector<Picture> more = oxfordPictures(*data);
     pictures.insert(pictures.end(), more.begin(), more.end());
   }
   csv << "series,picture,view,parameters,order,candidates,correct_candidates,matches,correct_matches,error_px,solved\n";
-  const std::vector<OrderSetting> settings = orderSettings(context.brief);
+  const std::vector<OrderSetting> settings = orderSettings(context);
   const auto compare = [&](const PointPair& pair, const std::string& series, const std::string& picture, int view) {
     for (const OrderSetting& setting : settings)
     {
@@ -175,8 +184,8 @@ void runCyclicOrderExperiment(const ExperimentContext& context, std::ostream& cs
     const std::vector<int>& angles = picture.surface == Surface::PLANE ? plane_angles : cylinder_angles;
     for (std::size_t i = 0; i < angles.size(); i += context.brief ? 3 : 1)
     {
-      const PointPair pair =
-          renderPair(picture.surface, picture.image, angles[i] * M_PI / 180.0, static_cast<std::uint64_t>(angles[i]));
+      const PointPair pair = renderPair(picture.surface, picture.image, angles[i] * M_PI / 180.0,
+                                        context.seedOf(DRAWN_PICTURES, static_cast<std::uint64_t>(angles[i])));
       compare(pair, pair.name, picture.name, angles[i]);
     }
   }

@@ -1,19 +1,20 @@
 // Copyright (c) 2026, the view_servo authors
 // SPDX-License-Identifier: BSD-3-Clause
-#include "homing_experiments.h"
+#include "experiments/homing_experiments.h"
 
-#include "input_file.h"
-#include "tools/package_folder.h"
-#include "parallel.h"
-#include "trials/homing_trial.h"
+#include "experiments/input_file.h"
+#include "experiments/parallel.h"
+#include "experiments/statistics.h"
 #include "sim/world_reader.h"
+#include "tools/package_folder.h"
+#include "trials/homing_trial.h"
 #include "view_servo/control/heading_hypotheses.h"
 #include "view_servo/geometry/camera.h"
-#include "view_servo/robust/random.h"
 #include "view_servo/images/image_io.h"
+#include "view_servo/robust/random.h"
 #include "view_servo/views/line_view_matcher.h"
-#include "view_servo/views/prepared_image.h"
 #include "view_servo/views/point_view_matcher.h"
+#include "view_servo/views/prepared_image.h"
 
 #include <Eigen/Geometry>
 #include <Eigen/LU>
@@ -21,6 +22,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <cstdint>
 #include <fstream>
 #include <iostream>
 #include <limits>
@@ -45,14 +47,15 @@ struct Run
   std::string world;
   HomingMode mode;
   bool hard;
-  int index;
+  int index;  ///< of the start; 0: the thesis' one
   PlanarPose start;
+  std::uint64_t seed;
 };
 
 sim::HomingTrialParams paramsOf(const Run& run)
 {
   sim::HomingTrialParams params;
-  params.seed = static_cast<std::uint64_t>(run.index) + 1;
+  params.seed = run.seed;
   if (run.hard)
   {
     params.conditions.image_noise = 5.0;
@@ -85,26 +88,60 @@ std::string toRow(const Run& run, const sim::HomingOutcome& outcome)
   return row.str();
 }
 
-std::vector<Run> allRuns(const std::map<std::string, sim::World>& worlds, bool brief)
+/** What becomes of all random starts under the same conditions. */
+class Summary
 {
-  constexpr std::uint64_t SEED = 5;
-  const int starts = brief ? 3 : 100;
+public:
+  void add(const sim::HomingOutcome& outcome)
+  {
+    constexpr double NEAR_ENOUGH = 0.02;            // [m]
+    constexpr double STRAIGHT_ENOUGH = M_PI / 180;  // [rad]
+    arrived_ += outcome.arrived ? 1 : 0;
+    good_ += outcome.arrived && outcome.distance_error <= NEAR_ENOUGH && std::abs(outcome.yaw_error) <= STRAIGHT_ENOUGH;
+    millimetres_.push_back(1e3 * outcome.distance_error);
+    degrees_.push_back(std::abs(outcome.yaw_error) * DEGREES);
+    seconds_.push_back(outcome.duration);
+  }
+
+  void print(std::ostream& stream) const
+  {
+    stream << good_ << " of " << millimetres_.size() << " random starts end within 2 cm and 1 degree, " << arrived_
+           << " say so; distance: median " << median(millimetres_) << ", 95 % " << percentile(millimetres_, 0.95)
+           << ", largest " << percentile(millimetres_, 1.0) << " mm; yaw: median " << median(degrees_) << ", largest "
+           << percentile(degrees_, 1.0) << " degrees; time: median " << median(seconds_) << ", longest "
+           << percentile(seconds_, 1.0) << " s" << std::endl;
+  }
+
+private:
+  int arrived_ = 0;
+  int good_ = 0;
+  std::vector<double> millimetres_;
+  std::vector<double> degrees_;
+  std::vector<double> seconds_;
+};
+
+std::vector<Run> allRuns(const std::map<std::string, sim::World>& worlds, const ExperimentContext& context)
+{
   std::vector<Run> runs;
+  const auto add = [&](const std::string& world, HomingMode mode, bool hard, int index, const PlanarPose& start) {
+    const std::uint64_t seed = context.seedOf(HOMING_STARTS, static_cast<std::uint64_t>(index) + 1);
+    runs.push_back({ world, mode, hard, index, start, seed });
+  };
   for (const char* name : { "desk", "cabinet" })
   {
-    const PlanarPose start = brief ? PlanarPose{ -0.1, 0.05, 0.0 } : toPlanar(worlds.at(name).start("thesis"));
-    runs.push_back({ name, HomingMode::THESIS, false, 0, start });
-    runs.push_back({ name, HomingMode::SERVO, false, 0, start });
+    const PlanarPose start = context.brief ? PlanarPose{ -0.1, 0.05, 0.0 } : toPlanar(worlds.at(name).start("thesis"));
+    add(name, HomingMode::THESIS, false, 0, start);
+    add(name, HomingMode::SERVO, false, 0, start);
   }
-  Rng rng(SEED);
+  Rng rng(context.seedOf(HOMING_STARTS, HOMING_STARTS.seed));
   const std::array<const char*, 3> names = { "desk", "cabinet", "corridor" };
-  for (int i = 0; i < starts; ++i)
+  for (int i = 0; i < context.runsOf(HOMING_STARTS); ++i)
   {
     const std::string name = names[static_cast<std::size_t>(i) % names.size()];
     const PlanarPose start = sim::randomStart(worlds.at(name), rng);
     for (const bool hard : { false, true })
     {
-      runs.push_back({ name, HomingMode::SERVO, hard, i + 1, start });
+      add(name, HomingMode::SERVO, hard, i + 1, start);
     }
   }
   return runs;
@@ -114,16 +151,14 @@ std::vector<Run> allRuns(const std::map<std::string, sim::World>& worlds, bool b
 
 void runHomingExperiment(const ExperimentContext& context, std::ostream& csv)
 {
-  constexpr double NEAR_ENOUGH = 0.02;            // [m]
-  constexpr double STRAIGHT_ENOUGH = M_PI / 180;  // [rad]
   std::map<std::string, sim::World> worlds;
   for (const char* name : { "desk", "cabinet", "corridor" })
   {
     worlds.emplace(name, sim::findWorld(name, packageFolder() / "config" / "worlds"));
   }
-  const std::vector<Run> runs = allRuns(worlds, context.brief);
+  const std::vector<Run> runs = allRuns(worlds, context);
   std::vector<std::string> rows(runs.size());
-  std::map<std::string, std::pair<int, int>> counts;  // of conditions: near enough, all
+  std::map<std::string, Summary> summaries;  // of conditions
   std::mutex mutex;
   std::size_t done = 0;
   inParallel(runs.size(), context.threads, [&](std::size_t i) {
@@ -134,10 +169,7 @@ void runHomingExperiment(const ExperimentContext& context, std::ostream& csv)
     std::cerr << ++done << " of " << runs.size() << ": " << rows[i] << std::flush;
     if (runs[i].index > 0)
     {
-      auto& [good, all] = counts[runs[i].hard ? "hard" : "plain"];
-      good +=
-          outcome.arrived && outcome.distance_error <= NEAR_ENOUGH && std::abs(outcome.yaw_error) <= STRAIGHT_ENOUGH;
-      ++all;
+      summaries[runs[i].hard ? "hard" : "plain"].add(outcome);
     }
   });
   csv << "world,mode,conditions,index,start_x,start_y,start_yaw_deg,arrived,distance_error_mm,ahead_mm,side_mm,"
@@ -146,10 +178,10 @@ void runHomingExperiment(const ExperimentContext& context, std::ostream& csv)
   {
     csv << row;
   }
-  for (const auto& [conditions, count] : counts)
+  for (const auto& [conditions, summary] : summaries)
   {
-    std::cout << conditions << ": " << count.first << " of " << count.second
-              << " random starts end within 2 cm and 1 degree" << std::endl;
+    std::cout << conditions << ": ";
+    summary.print(std::cout);
   }
 }
 
@@ -231,14 +263,19 @@ void runDirectionsExperiment(const ExperimentContext& context, std::ostream& csv
   {
     walk.pairs.resize(std::min<std::size_t>(walk.pairs.size(), 6));
   }
-  const PointViewMatcher points{ PointViewMatcherParams() };
-  const LineViewMatcher lines{ LineMatcherParams() };
+  PointViewMatcherParams point_params;
+  point_params.seed = context.seedOf(DIRECTION_DRAWS, point_params.seed);
+  const PointViewMatcher points{ point_params };
+  LineMatcherParams line_params;
+  line_params.seed = context.seedOf(DIRECTION_DRAWS, line_params.seed);
+  const LineViewMatcher lines{ line_params };
   FeatureParams features;
   features.points = points.params().points;
   features.segments = lines.params().segments;
   features.lines = lines.params().features;
   HeadingHypothesesParams params;
   params.motion = CameraMotion::FREE;
+  params.seed = context.seedOf(DIRECTION_DRAWS, params.seed);
 
   std::vector<std::string> rows(walk.pairs.size());
   std::mutex mutex;

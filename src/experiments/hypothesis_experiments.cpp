@@ -1,9 +1,10 @@
 // Copyright (c) 2026, the view_servo authors
 // SPDX-License-Identifier: BSD-3-Clause
-#include "hypothesis_experiments.h"
+#include "experiments/hypothesis_experiments.h"
 
-#include "parallel.h"
-#include "point_pairs.h"
+#include "experiments/parallel.h"
+#include "experiments/point_pairs.h"
+#include "experiments/statistics.h"
 #include "view_servo/geometry/fundamental.h"
 #include "view_servo/geometry/homography.h"
 #include "view_servo/matching/assignment.h"
@@ -24,7 +25,6 @@
 #include <limits>
 #include <map>
 #include <mutex>
-#include <numeric>
 #include <string>
 #include <utility>
 #include <vector>
@@ -203,30 +203,6 @@ bool available(Algorithm algorithm)
   return algorithm != Algorithm::MAGSAC || VIEW_SERVO_HAS_USAC;
 }
 
-double mean(const std::vector<double>& values)
-{
-  return std::accumulate(values.begin(), values.end(), 0.0) / static_cast<double>(values.size());
-}
-
-double deviation(const std::vector<double>& values)
-{
-  const double centre = mean(values);
-  double squares = 0.0;
-  for (const double value : values)
-  {
-    squares += (value - centre) * (value - centre);
-  }
-  return std::sqrt(squares / static_cast<double>(values.size()));
-}
-
-double median(std::vector<double> values)
-{
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end(),
-                   [](double a, double b) { return a < b || (!std::isnan(a) && std::isnan(b)); });
-  return *middle;
-}
-
 // ------------------------------------------------------------------------------------------------- the simulation
 
 constexpr int POINTS = 500;
@@ -319,7 +295,7 @@ std::vector<Simulation> simulations(bool brief)
 
 void runMultiHypothesisExperiment(const ExperimentContext& context, std::ostream& csv)
 {
-  const int runs = context.brief ? 3 : 20;
+  const int runs = context.runsOf(HYPOTHESIS_SCENES);
   cv::setNumThreads(1);  // times are those of one thread
   const std::vector<Simulation> all = simulations(context.brief);
   std::vector<std::vector<double>> correct(all.size(), std::vector<double>(static_cast<std::size_t>(runs)));
@@ -331,9 +307,9 @@ void runMultiHypothesisExperiment(const ExperimentContext& context, std::ostream
   inParallel(static_cast<std::size_t>(runs), context.threads, [&](std::size_t i) {
     for (std::size_t k = 0; k < all.size(); ++k)
     {
-      Rng scene_rng(i + 1);  // every algorithm and level sees the same points
+      Rng scene_rng(context.seedOf(HYPOTHESIS_SCENES, i + 1));  // every algorithm and level sees the same points
       const Problem problem = simulate(all[k].sigma, scene_rng);
-      Rng rng(1000 + i);
+      Rng rng(context.seedOf(HYPOTHESIS_SCENES, 1000 + i));
       const Estimate estimate = run(problem, all[k].settings, rng);
       const auto right = std::count_if(estimate.matches.begin(), estimate.matches.end(),
                                        [](const Association& match) { return match.row == match.column; });
@@ -371,7 +347,7 @@ void runRealPairsExperiment(const ExperimentContext& context, std::ostream& csv)
 {
   constexpr double THRESHOLD = 2.0;          // [px]
   constexpr double VIEW_CONSISTENCY = 0.03;  // as ViewConsistencyParams
-  const int runs = context.brief ? 3 : 20;
+  const int runs = context.runsOf(REAL_PAIR_RUNS);
   struct Images
   {
     std::string folder;
@@ -441,7 +417,7 @@ void runRealPairsExperiment(const ExperimentContext& context, std::ostream& csv)
       std::vector<double> error = matches;
       std::vector<double> ms = matches;
       inParallel(matches.size(), context.threads, [&](std::size_t i) {
-        Rng rng(i + 1);
+        Rng rng(context.seedOf(REAL_PAIR_RUNS, i + 1));
         const Estimate estimate = run(problem, settings, rng);
         const Correspondences found = pairsOf(problem, estimate.matches);
         // Of several planes or motions, the one that was found.

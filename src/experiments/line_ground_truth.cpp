@@ -1,8 +1,8 @@
 // Copyright (c) 2026, the view_servo authors
 // SPDX-License-Identifier: BSD-3-Clause
-#include "line_ground_truth.h"
+#include "experiments/line_ground_truth.h"
 
-#include "input_file.h"
+#include "experiments/input_file.h"
 #include "view_servo/images/image_io.h"
 #include "view_servo/views/segment_io.h"
 

@@ -14,19 +14,22 @@
 
 namespace view_servo
 {
-/** @file Image pairs whose line matches are known, in the folder named by VIEW_SERVO_DATA; for benchmarks. */
+/** @file Real pairs of images whose true line matches are known, from the folder that VIEW_SERVO_DATA names. */
 
-/** The folder, or empty with a message on stderr when the variable is not set or names none. */
+/** That folder; empty, with a message on standard error, when the variable is not set or names no folder. */
 std::optional<std::filesystem::path> dataFolder();
 
-/** Which segments of two images show the same physical line: any of the first with any of the second. */
+/**
+ * Indices of segments that show the same physical line, which may be broken: each of the reference image matches each
+ * of the current one.
+ */
 struct LineGroupTruth
 {
   std::vector<int> reference;
   std::vector<int> current;
 };
 
-/** Two images, segments in each, and which of these correspond. */
+/** Two images, line segments in each, and which of them match. */
 struct LinePair
 {
   std::string name;
@@ -36,6 +39,7 @@ struct LinePair
   Segments current_segments;
   std::vector<LineGroupTruth> truth;
 
+  /** Whether two segments, by their indices, show the same line. */
   bool areSame(int reference_index, int current_index) const;
 };
 

@@ -1,6 +1,6 @@
 // Copyright (c) 2026, the view_servo authors
 // SPDX-License-Identifier: BSD-3-Clause
-#include "parallel.h"
+#include "experiments/parallel.h"
 
 #include <algorithm>
 #include <atomic>

@@ -8,7 +8,8 @@
 namespace view_servo
 {
 /**
- * Calls `work(i)` for all i below `count`, on several threads. An exception ends all and is passed on.
+ * Calls `work(i)` once for each i below `count`, on several threads. When one call throws, no further ones begin, and
+ * the exception is thrown here.
  * @param max_threads 0: as many as there are processors.
  */
 void inParallel(std::size_t count, int max_threads, const std::function<void(std::size_t)>& work);

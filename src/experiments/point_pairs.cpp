@@ -1,8 +1,8 @@
 // Copyright (c) 2026, the view_servo authors
 // SPDX-License-Identifier: BSD-3-Clause
-#include "point_pairs.h"
+#include "experiments/point_pairs.h"
 
-#include "input_file.h"
+#include "experiments/input_file.h"
 #include "view_servo/geometry/fundamental.h"
 #include "view_servo/geometry/homography.h"
 #include "view_servo/images/image_io.h"

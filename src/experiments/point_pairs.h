@@ -16,26 +16,26 @@
 
 namespace view_servo
 {
-/** @file Image pairs whose point matches are known, rendered or read from real data; for experiments. */
+/** @file Pairs of images whose true point matches are known: rendered ones, and real ones from VIEW_SERVO_DATA. */
 
-/** Two images of a scene and what is known of them. */
+/** Two images of a scene, and the ground truth of how they are related. */
 struct PointPair
 {
   std::string name;
   cv::Mat reference;  ///< 8-bit grey
   cv::Mat current;
-  GeometryModel model;                                 ///< what relates the two
-  std::function<double(const Correspondence&)> error;  ///< of a match [px]; NaN where there can be none
-  Correspondences points;                              ///< true ones, to measure a geometry with
+  GeometryModel model;                                 ///< what relates the two images
+  std::function<double(const Correspondence&)> error;  ///< of a match [px]; NaN where the point can have no match
+  Correspondences points;                              ///< true matches, at which an estimated geometry is measured
 
-  /** Within 4 px of the truth. */
+  /** Whether a match is within 4 px of the truth. */
   bool isCorrect(const Correspondence& match) const;
   int countCorrect(const Correspondences& matches) const;
-  /** Mean error of an H (transfer) or F (Sampson distance) at `points` [px]; NaN for a NaN matrix. */
+  /** Mean error of a homography (transfer) or fundamental matrix (Sampson) at `points` [px]; NaN for a NaN matrix. */
   double geometryError(GeometryModel kind, const Eigen::Matrix3d& matrix) const;
 };
 
-/** What the folders oxford_affine and kusvod2 hold. */
+/** Names of what the folders oxford_affine and kusvod2 hold. */
 const std::vector<std::string>& oxfordSequences();
 const std::vector<std::string>& kusvodPairs();
 

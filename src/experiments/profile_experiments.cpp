@@ -1,8 +1,9 @@
 // Copyright (c) 2026, the view_servo authors
 // SPDX-License-Identifier: BSD-3-Clause
-#include "profile_experiments.h"
+#include "experiments/profile_experiments.h"
 
-#include "point_pairs.h"
+#include "experiments/point_pairs.h"
+#include "experiments/statistics.h"
 #include "view_servo/matching/point_matcher.h"
 #include "view_servo/robust/fundamental_estimator.h"
 #include "view_servo/robust/view_consistency.h"
@@ -54,14 +55,7 @@ private:
   ProfileIndex index_;
 };
 
-double median(std::vector<double> values)
-{
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
-}
-
-/** What RANSAC left of candidates. */
+/** What RANSAC leaves of candidates. */
 struct Estimate
 {
   double inliers = 0.0;
@@ -88,7 +82,7 @@ Estimate estimate(const PointPair& pair, const Correspondences& candidates, doub
   return found;
 }
 
-/** Of each number the median; NaN counts as larger than any. */
+/** The median of each number; NaN counts as larger than any number. */
 Estimate medians(const std::vector<Estimate>& estimates)
 {
   const auto of = [&](const auto& member) {
@@ -115,7 +109,7 @@ Estimate medians(const std::vector<Estimate>& estimates)
 
 // ------------------------------------------------------------------------------------------- figures 6.8 to 6.10
 
-/** Profiles, and the searches among them that a figure compares. */
+/** A kind of profiles, and the searches among them that a figure compares. */
 struct Setting
 {
   std::string figure;
@@ -198,7 +192,7 @@ void runProfileParametersExperiment(const ExperimentContext& context, std::ostre
   pairs.push_back(readKusvodPair(context.data, "wash"));
   RansacParams ransac_params;
   ransac_params.inlier_threshold = 1.0;
-  const std::uint64_t seeds = context.brief ? 1 : 5;
+  const auto runs = static_cast<std::uint64_t>(context.runsOf(PROFILE_RUNS));
   csv << "figure,pair,pairing,pairing_value,coefficients,search,search_value,candidates,correct_candidates,matches,"
          "correct_matches,error_px\n";
   for (const PointPair& pair : pairs)
@@ -215,9 +209,9 @@ void runProfileParametersExperiment(const ExperimentContext& context, std::ostre
         params.search = search;
         const Correspondences candidates = features.candidates(params);
         std::vector<Estimate> estimates;
-        for (std::uint64_t seed = 1; seed <= seeds; ++seed)
+        for (std::uint64_t run = 1; run <= runs; ++run)
         {
-          estimates.push_back(estimate(pair, candidates, 0.0, ransac_params, seed));
+          estimates.push_back(estimate(pair, candidates, 0.0, ransac_params, context.seedOf(PROFILE_RUNS, run)));
         }
         const Estimate found = medians(estimates);
         const bool near_pairs = setting.profiles.selection == PairSelection::NEAREST;
@@ -252,7 +246,7 @@ void runViewConsistencyExperiment(const ExperimentContext& context, std::ostream
   {
     pairs.push_back(readMertonPoints(context.data, 1, view));
   }
-  const std::uint64_t seeds = context.brief ? 1 : 9;
+  const auto runs = static_cast<std::uint64_t>(context.runsOf(VIEW_CONSISTENCY_RUNS));
   const ViewConsistencyParams consistency;
   RansacParams params;
   params.inlier_threshold = 1.0;
@@ -278,8 +272,9 @@ void runViewConsistencyExperiment(const ExperimentContext& context, std::ostream
       std::vector<double> kept_correct;
       std::vector<double> filter_ms;
       std::vector<double> factors;
-      for (std::uint64_t seed = 1; seed <= seeds; ++seed)
+      for (std::uint64_t run = 1; run <= runs; ++run)
       {
+        const std::uint64_t seed = context.seedOf(VIEW_CONSISTENCY_RUNS, run);
         plain.push_back(estimate(pair, candidates, 0.0, params, seed));
 
         Rng rng(seed);

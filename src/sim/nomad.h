@@ -22,11 +22,11 @@ struct NomadParams
   double max_turn_rate = 1.0;          ///< [rad/s], > 0
   double max_acceleration = 1.0;       ///< [m/s²], > 0
   double max_turn_acceleration = 2.0;  ///< [rad/s²], > 0
-  double radius = 0.26;                ///< of its outline on the floor [m], > 0
-  double odometry_drift = 0.0;         ///< distance measured too long, as a part of it, > -1
-  double odometry_turn_drift = 0.0;    ///< turn that odometry adds [rad/m]
-  double odometry_noise = 0.0;         ///< sd of the measured motion, as a part of it, >= 0
-  std::uint64_t seed = 1;
+  double radius = 0.26;                ///< of its round outline on the floor [m], > 0
+  double odometry_drift = 0.0;         ///< by which part it measures distances too long, > -1
+  double odometry_turn_drift = 0.0;    ///< turn that it measures and that does not happen [rad/m]
+  double odometry_noise = 0.0;         ///< standard deviation of measured motion, as a part of it, >= 0
+  std::uint64_t seed = 1;              ///< of odometry's noise
 
   /** All faults, one a line; empty when the parameters are usable. */
   std::vector<std::string> validate() const;
@@ -36,48 +36,57 @@ struct NomadParams
 std::vector<Parameter> parameters(NomadParams& params);
 
 /**
- * A holonomic base like the Nomad 200: it moves in any direction without turning, and turns. Poses are on the floor.
+ * A holonomic base like the Nomad 200, which moves in any direction without turning and turns without moving. Its poses
+ * lie on the floor.
  */
 class Nomad
 {
 public:
-  /** (v_x, v_y, turn rate) in the base's frame [m/s, m/s, rad/s]. */
+  /** (v_x, v_y, turn rate) in `base_link` [m/s, m/s, rad/s]. */
   using Velocity = Eigen::Vector3d;
 
-  /** Starts at the world's goal. @throws std::invalid_argument naming the parameters' faults. */
+  /**
+   * Starts at rest at the world's goal. The world must outlive the object.
+   * @throws std::invalid_argument naming the parameters' faults, or an obstacle at the goal.
+   */
   Nomad(const World& world, const NomadParams& params);
 
   /**
-   * Puts the base there, at rest; odometry does not notice. Only x, y and yaw count.
-   * @throws std::invalid_argument when it is not finite or an obstacle, which is named, stands there.
+   * Puts the base there at once, at rest; its odometry does not change. Only x, y and yaw of the pose count.
+   * @param pose world from base.
+   * @throws std::invalid_argument when the pose is not finite, or naming an obstacle that stands there.
    */
   void setPose(const Eigen::Isometry3d& pose);
 
-  /** What to do from now on, as far as the limits allow. @return false, and nothing changes, when it is not finite. */
+  /**
+   * Sets the velocity to reach and keep from now on, as far as the limits allow.
+   * @return false, and nothing changes, when it is not finite.
+   */
   bool command(const Velocity& velocity);
 
-  /** Stands still at once, by its brakes. */
+  /** Stops at once, as by its brakes. */
   void halt();
 
-  /** Moves on by `dt` [s], > 0; obstacles stop it. */
+  /** Simulates the next `dt` [s], > 0; an obstacle in the way stops the base. */
   void step(double dt);
 
   /** World from base. */
   Eigen::Isometry3d pose() const;
   /** World from the camera's optical frame. */
   Eigen::Isometry3d cameraPose() const;
+  /** The true one. */
   const Velocity& velocity() const
   {
     return velocity_;
   }
-  /** Where odometry thinks the base is, from where it was when this object was made. */
+  /** `odom` from base, as odometry has it: `odom` is where the base was when this object was made. */
   Eigen::Isometry3d odometry() const;
-  /** What odometry measured over the last step. */
+  /** The mean velocity of the last step, as odometry measured it. */
   const Velocity& measuredVelocity() const
   {
     return measured_;
   }
-  /** The obstacle that the base pushes against; empty: none. */
+  /** The obstacle that stopped the base in the last step; empty when none did. */
   const std::string& blockedBy() const
   {
     return blocked_by_;

@@ -17,38 +17,43 @@
 namespace view_servo::sim
 {
 /**
- * A camera in a world: OpenGL by OSMesa, without a display or a graphics card. Textures are mip-mapped, pixels
- * supersampled; a pixel's centre is at whole coordinates, as in K. Each object belongs to one thread at a time.
+ * The camera of a world. It draws by OpenGL (OSMesa), without a display or a graphics card; textures are mip-mapped and
+ * pixels supersampled. The centre of a pixel is at whole coordinates, as K has it. An object must not be used by
+ * several threads at once.
  */
 class SimulatedCamera
 {
 public:
   /**
-   * @param groups of surfaces to show besides those without a group.
+   * @param groups of surfaces to draw besides those without a group.
    * @param seed of the noise; the same calls in the same order give the same images.
-   * @throws std::invalid_argument for a group that no surface has or a distortion that cannot be inverted,
-   * std::runtime_error when OpenGL cannot be had.
+   * @throws std::invalid_argument for a group that no surface has or a distortion that cannot be inverted.
+   * @throws std::runtime_error when there is no OpenGL.
    */
   SimulatedCamera(const World& world, const std::vector<std::string>& groups, std::uint64_t seed);
   ~SimulatedCamera();
   SimulatedCamera(const SimulatedCamera&) = delete;
   SimulatedCamera& operator=(const SimulatedCamera&) = delete;
 
+  /** Changes the light of the images that follow. */
   void setLight(const Light& light);
   const Light& light() const
   {
     return light_;
   }
 
-  /** What the camera sees, 8-bit with one channel. @param camera world from optical frame. */
+  /** An image, 8-bit with one channel, without exposure. @param camera world from optical frame. */
   cv::Mat capture(const Eigen::Isometry3d& camera);
-  /** The mean of what it sees from several poses, evenly spaced over its exposure. At least one. */
+  /**
+   * An image that is blurred by motion, 8-bit with one channel: the mean of what is seen from several poses.
+   * @param during_exposure world from optical frame, at times spread evenly over the exposure; at least one.
+   */
   cv::Mat capture(const std::vector<Eigen::Isometry3d>& during_exposure);
 
 private:
   struct Context;
 
-  /** Radiances [grey levels], 32-bit, before light and noise. */
+  /** Radiances [grey levels], 32-bit with one channel, before light and noise. */
   cv::Mat render(const Eigen::Isometry3d& camera);
 
   ImageQuality quality_;

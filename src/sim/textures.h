@@ -9,15 +9,16 @@
 
 namespace view_servo::sim
 {
-/** Kinds of drawn pictures, for messages. */
+/** The names of all kinds of drawn pictures, for messages. */
 std::string textureKinds();
 
 /**
- * A drawn picture, 8-bit with one channel, the same for the same arguments. `kind` is one of textureKinds(): `checker`
- * (count x count fields), `blotches`, `wood`, `bricks`, `panel` (a cupboard's door), `poster` (patches of all sizes),
- * `print` (a box's front: lettering and shapes), `plain`.
+ * Draws a picture, 8-bit with one channel. The same arguments give the same picture.
+ * @param kind `checker` (count x count fields), `blotches`, `wood`, `bricks`, `panel` (a cupboard's door), `poster`
+ * (patches of all sizes), `print` (the front of a box: lettering and shapes) or `plain`.
  * @param size of the picture [px].
- * @param grey its mean, about [0, 255].
+ * @param grey about the mean of the picture [0, 255].
+ * @param count how many things are drawn, for kinds that have a number of them.
  * @throws std::invalid_argument for an unknown kind or an empty size.
  */
 cv::Mat drawTexture(const std::string& kind, const cv::Size& size, double grey, int count, std::uint64_t seed);

@@ -12,15 +12,19 @@
 namespace view_servo::sim
 {
 /**
- * Distance along a ray to the first surface without a group [m], beyond `nearest`; empty: it meets none.
- * @param direction of unit length.
+ * The distance along a ray to the first surface that it meets [m]; empty when it meets none. Only surfaces without a
+ * group count, and only distances above `nearest`.
+ * @param origin in the world.
+ * @param direction in the world, of unit length.
  */
 std::optional<double> firstHit(const World& world, const Eigen::Vector3d& origin, const Eigen::Vector3d& direction,
                                double nearest = 0.0);
 
 /**
- * Part of what a camera sees from `reference` that it also sees from `current`, in the image and not hidden, [0, 1].
- * Both: world from optical frame.
+ * The part, in [0, 1], of what the camera sees from `reference` that it also sees from `current`: it must lie in the
+ * image there, and nothing may hide it.
+ * @param reference world from optical frame.
+ * @param current world from optical frame.
  */
 double shareInSight(const World& world, const Eigen::Isometry3d& reference, const Eigen::Isometry3d& current);
 

@@ -40,27 +40,28 @@
 
 namespace view_servo
 {
-/** What a run can be told. */
+/** The parameters of a run. */
 struct RunParams
 {
   std::string world;
-  std::string start;
-  std::string view = "demo";
+  std::string start;                                ///< where the robot begins, as the program describes it
+  std::string view = "demo";                        ///< the name that the view is stored by
   double timeout;                                   ///< of the goal [s]
   double patience = START_PATIENCE;                 ///< longest wait for another node [s]
-  std::function<void(const std::string&)> give_up;  ///< ends the process as a failed run, and says why
+  std::function<void(const std::string&)> give_up;  ///< ends the process as a failed run, for the reason given
 };
 
 /**
- * What runs of simulated robots share: the view is stored at the world's goal, the robot goes to a start, and the
- * action that brings it back is called; how far off it ends is measured by the ground truth. All waits are by a steady
- * clock, end after `RunParams::patience`, and say what they wait for.
+ * The steps of a run of a simulated robot, which are the same for both robots: the view is stored at the world's goal,
+ * the robot is put at a start, and the action that brings it back is called. How far off it ends is measured by the
+ * ground truth. All waits are by a steady clock and end after `RunParams::patience`; the exception then says what was
+ * waited for.
  */
 template <typename Action>
 class SimulatedRun
 {
 public:
-  /** @param robot simulation, and @param controller its servo, by node names; @param action the controller's. */
+  /** @param robot node of the simulation. @param controller node that drives it. @param action of the controller. */
   SimulatedRun(ros::NodeHandle& nh, const RunParams& params, const std::string& robot, const std::string& controller,
                const std::string& action)
     : nh_(nh), params_(params), robot_(robot), controller_(controller), action_name_(action), client_(nh, action, true)
@@ -70,10 +71,9 @@ public:
   }
 
   /**
-   * Waits for everything that a run needs: the simulation tells where the camera is, images arrive, the services and
-   * the action are offered.
-   * @param others services besides those that every run calls.
-   * @throws std::runtime_error naming what does not come.
+   * Waits for everything that a run needs: the ground truth and images arrive, services and the action are offered.
+   * @param others services to wait for besides those that every run calls.
+   * @throws std::runtime_error naming what is missing.
    */
   void waitForOthers(const std::vector<std::string>& others)
   {
@@ -112,7 +112,8 @@ public:
 
   /**
    * Moves the robot, and waits until images show it there.
-   * @param pose as SetPose takes it. @param camera where the camera is then. @return where it is.
+   * @param pose as SetPose takes it. @param camera world from the camera, as it should be then.
+   * @return world from the camera, as it is.
    */
   Eigen::Isometry3d moveTo(const Eigen::Isometry3d& pose, const Eigen::Isometry3d& camera)
   {
@@ -126,7 +127,7 @@ public:
                    });
   }
 
-  /** The camera's pose when the robot stands. */
+  /** Waits until the robot stands still. @return world from the camera. */
   Eigen::Isometry3d rest()
   {
     constexpr double STILL = 1e-6;  // [m], [rad]
@@ -135,7 +136,7 @@ public:
     });
   }
 
-  /** Stores what the camera sees. */
+  /** Stores what the camera sees as a view. @param region of interest [px]; empty: the whole image. */
   void save(const std::string& view, const cv::Rect& region)
   {
     SaveView service;
@@ -146,8 +147,8 @@ public:
   }
 
   /**
-   * Enables the controller, sends it the goal and waits for the end.
-   * @throws std::runtime_error when it does not end in time, or its server vanishes; the goal is cancelled then.
+   * Enables the controller, sends it a goal and waits until that has ended.
+   * @throws std::runtime_error when it does not end in time, or its server vanishes; the goal is then cancelled.
    */
   typename Action::_action_result_type::_result_type drive(const typename Action::_action_goal_type::_goal_type& goal)
   {
@@ -318,14 +319,14 @@ private:
   ros::Subscriber status_subscriber_;
 };
 
-/** What comes of a run. */
+/** How a run ended. */
 struct RunOutcome
 {
   bool success = false;
   std::string summary;  ///< one line
 };
 
-/** Whether a process is roslaunch, itself or as a script that an interpreter runs. */
+/** Whether a process is roslaunch: started by its name, or as a script that an interpreter runs. */
 inline bool isRoslaunch(pid_t process)
 {
   std::ifstream file("/proc/" + std::to_string(process) + "/cmdline");
@@ -341,9 +342,9 @@ inline bool isRoslaunch(pid_t process)
 }
 
 /**
- * Ends a run's process group in the way that leaves nothing red on the terminal: roslaunch, when it is the parent, is
- * asked to end as Ctrl-C asks it, and it then ends this process with the others. Did this process end first, roslaunch
- * would report that a required process has died, which is right only when it crashes.
+ * Ends roslaunch, when that has started this process, as Ctrl-C does; roslaunch then ends this process and the others.
+ * If this process ended first instead, roslaunch would report in red that a required process has died, as after a
+ * crash.
  */
 inline void endWithRoslaunch()
 {
@@ -364,8 +365,9 @@ inline void endWithRoslaunch()
  *  - `~exit` (bool, default true): end afterwards, with status 0 when the robot is at the view and 1 when not, and let
  *    roslaunch end, too, when that has started the program.
  *
- * @param what of the run, for the line that is printed.
- * @param run does it; what it throws is the outcome, too.
+ * @param name of the node.
+ * @param what is run, for the line that is printed.
+ * @param run does it; an exception counts as a failed run.
  */
 inline int runSimulation(int argc, char** argv, const std::string& name, const std::string& what, RunParams params,
                          const std::function<RunOutcome(ros::NodeHandle&, const sim::World&, const RunParams&)>& run)

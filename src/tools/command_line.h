@@ -12,9 +12,9 @@
 
 namespace view_servo
 {
-/** @file What the command-line programs promise: one line on standard error, and nothing else there. */
+/** @file Command-line programs write one line on standard error when they fail, and nothing else there. */
 
-/** Messages may have several lines; this joins them. */
+/** Joins the lines of a message. */
 inline std::string oneLine(const std::string& text)
 {
   std::istringstream lines(text);
@@ -26,7 +26,7 @@ inline std::string oneLine(const std::string& text)
   return joined;
 }
 
-/** Keeps standard error quiet: libraries, such as decoders of images, write there on their own. */
+/** As long as it lives, standard error is discarded: some libraries, as those that decode images, write there. */
 class QuietStandardError
 {
 public:

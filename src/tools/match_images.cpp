@@ -1,6 +1,6 @@
 // Copyright (c) 2026, the view_servo authors
 // SPDX-License-Identifier: BSD-3-Clause
-#include "command_line.h"
+#include "tools/command_line.h"
 #include "view_servo/features/line_segments.h"
 #include "view_servo/geometry/correspondence.h"
 #include "view_servo/images/image_io.h"

@@ -6,7 +6,7 @@
 
 namespace view_servo
 {
-/** Where the package's files lie: in the source tree, or where they were installed. */
+/** The folder with `config/` and `urdf/` of this package: its source tree, or where it was installed. */
 std::filesystem::path packageFolder();
 
 }  // namespace view_servo

@@ -32,10 +32,10 @@
 #include <vector>
 
 /** @file
- * `record_bag WORLD TRAJECTORY OUT.bag`: drives a simulated robot along a trajectory, without a ROS master, and writes
- * what it would publish, with the ground truth. `record_bag --images FOLDER OUT.bag`: the same of a recorded walk. The
- * same command writes the same bytes. Exit status: 0 written, 2 bad input, with one line on standard error that names
- * the file or option; then there is no file.
+ * `record_bag WORLD TRAJECTORY OUT.bag` drives a simulated robot along a trajectory, without a ROS master, and writes
+ * the messages that it would publish, with the ground truth. `record_bag --images FOLDER OUT.bag` writes recorded
+ * images. The same command writes the same bytes. Exit status: 0 written; 2 bad input, with one line on standard error
+ * that names the file or option, and no bag.
  */
 namespace
 {
@@ -62,7 +62,7 @@ constexpr double MAX_DURATION = 3600.0;  // of a trajectory [s]
 constexpr double TRACKING_GAIN = 2.0;    // of the way back to the trajectory [1/s]
 constexpr int BLUR_POSES = 5;            // seen during an exposure
 
-/** What is not set is as the world says, or perfect. */
+/** An optional one that is not set is as the world has it, or without error. */
 struct Options
 {
   std::vector<std::string> names;
@@ -152,7 +152,7 @@ Twist twistBetween(const Eigen::Isometry3d& from, const Eigen::Isometry3d& to)
   return twist;
 }
 
-/** As fast as the trajectory moves, and back to it. @param next where the trajectory is DT later. */
+/** The twist that moves on with the trajectory and corrects the error. @param next where the trajectory is DT later. */
 Twist trackingTwist(const Eigen::Isometry3d& pose, const Eigen::Isometry3d& wanted, const Eigen::Isometry3d& next)
 {
   const Eigen::Matrix3d wanted_in_pose = pose.linear().transpose() * wanted.linear();
@@ -163,7 +163,7 @@ Twist trackingTwist(const Eigen::Isometry3d& pose, const Eigen::Isometry3d& want
   return twist;
 }
 
-/** Where the camera is while it exposes: around `now`, as fast as it came there from where it was DT before. */
+/** Poses of the camera during an exposure around `now`, when it goes on as it has come there since DT before. */
 std::vector<Eigen::Isometry3d> posesOfExposure(const Eigen::Isometry3d& before, const Eigen::Isometry3d& now,
                                                double exposure)
 {
@@ -188,7 +188,7 @@ std::vector<Eigen::Isometry3d> posesOfExposure(const Eigen::Isometry3d& before, 
   return poses;
 }
 
-/** Whether something that happens at a rate [Hz], the first time at step 0, does so at this step. */
+/** Whether something that happens at a rate [Hz], beginning with step 0, happens at this step. */
 bool isDue(int step, double rate)
 {
   constexpr double ROUNDING = 1e-9;
@@ -314,7 +314,7 @@ struct PosedImage
   Eigen::Isometry3d pose;  // world from optical frame
 };
 
-/** Lines of a file's name and the 16 numbers of its pose, row by row; '#' starts a remark. */
+/** Reads lines with the name of an image and the 16 numbers of its pose, row by row; '#' starts a remark. */
 std::vector<PosedImage> readPoses(const fs::path& path)
 {
   std::istringstream lines(textOf(path.string()));
@@ -369,7 +369,9 @@ Eigen::Matrix3d readIntrinsics(const fs::path& path)
   return k;
 }
 
-/** A folder with K.txt, poses.txt (camera to world) and images/; without stamps, so the rate is made up. */
+/**
+ * Writes a folder with K.txt, poses.txt (world from camera) and images/. It has no stamps, so the rate is an option.
+ */
 void recordImages(const std::string& file, const Options& options)
 {
   const fs::path folder = options.images;

@@ -2,10 +2,10 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "experiments/hypothesis_experiments.h"
 
+#include "experiments/point_pairs.h"
 #include "sim/textures.h"
 #include "support/csv_table.h"
 #include "support/temporary_directory.h"
-#include "experiments/point_pairs.h"
 
 #include <gtest/gtest.h>
 #include <opencv2/imgcodecs.hpp>

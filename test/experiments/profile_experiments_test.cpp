@@ -2,11 +2,11 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "experiments/profile_experiments.h"
 
+#include "experiments/cyclic_order_experiment.h"
+#include "experiments/point_pairs.h"
 #include "sim/textures.h"
 #include "support/csv_table.h"
 #include "support/temporary_directory.h"
-#include "experiments/cyclic_order_experiment.h"
-#include "experiments/point_pairs.h"
 #include "view_servo/geometry/homography.h"
 
 #include <gtest/gtest.h>

@@ -1,0 +1,152 @@
+// Copyright (c) 2026, the view_servo authors
+// SPDX-License-Identifier: BSD-3-Clause
+// Options of the program, and what they do to the experiments.
+#include "experiments/experiment_context.h"
+#include "experiments/hypothesis_experiments.h"
+#include "support/csv_table.h"
+#include "support/temporary_directory.h"
+#include "test_paths.h"
+
+#include <gtest/gtest.h>
+
+#include <sys/wait.h>
+
+#include <cstdint>
+#include <cstdlib>
+#include <fstream>
+#include <iterator>
+#include <optional>
+#include <sstream>
+#include <string>
+#include <vector>
+
+namespace view_servo
+{
+namespace
+{
+struct Outcome
+{
+  int status;
+  std::string out;
+  std::string err;
+};
+
+Outcome run(const std::string& arguments)
+{
+  const test::TemporaryDirectory directory;
+  const std::string folder = directory.path();
+  const std::string command = "cd '" + folder + "'; '" EXPERIMENTS_PATH "' " + arguments + " > out 2> err < /dev/null";
+  const int status = std::system(command.c_str());
+  const auto text_of = [&](const std::string& name) -> std::string {
+    std::ifstream stream(folder + "/" + name);
+    return { std::istreambuf_iterator<char>(stream), {} };
+  };
+  return { WIFEXITED(status) ? WEXITSTATUS(status) : -1, text_of("out"), text_of("err") };
+}
+
+void expectContains(const std::string& text, const std::string& part)
+{
+  EXPECT_NE(text.find(part), std::string::npos) << text << "has no " << part;
+}
+
+}  // namespace
+
+TEST(Experiments, ListSaysWhatIsRepeatedAndFromWhichSeed)
+{
+  const Outcome outcome = run("--list");
+  EXPECT_EQ(outcome.status, 0);
+  expectContains(outcome.out,
+                 "homing: chapter 5: homing in simulated rooms, from many starts; --runs 100 (random starts); "
+                 "--seed 5\n");
+  expectContains(outcome.out, "homing_directions: the heading between real views of a room; --seed 1\n");
+  expectContains(outcome.out, "lines_table: tables 4.1 and 4.2: line matching by pairs and triplets\n");
+}
+
+TEST(Experiments, RefusesRunsWhereNothingIsRepeated)
+{
+  for (const std::string name : { "lines_table", "arm_geometry", "homing_directions" })
+  {
+    const Outcome outcome = run(name + " --runs 3");
+    EXPECT_EQ(outcome.status, 2);
+    expectContains(outcome.err, "--runs: " + name + " repeats nothing");
+    expectContains(outcome.err,
+                   "homing, arm, multi_hypothesis, real_pairs, profiles_parameters, view_consistency, "
+                   "cyclic_order do");
+  }
+}
+
+TEST(Experiments, RefusesASeedWhereNothingIsDrawn)
+{
+  for (const std::string name : { "lines_table", "arm_geometry" })
+  {
+    const Outcome outcome = run(name + " --seed 3");
+    EXPECT_EQ(outcome.status, 2);
+    expectContains(outcome.err, "--seed: " + name + " draws no random numbers");
+    expectContains(outcome.err, "homing_directions");
+  }
+}
+
+TEST(Experiments, RefusesNumbersOutOfRange)
+{
+  for (const std::string value : { "0", "-1", "1.5", "x", "" })
+  {
+    const Outcome outcome = run("homing --runs " + value);
+    EXPECT_NE(outcome.status, 0) << value;
+    expectContains(outcome.err, "--runs");
+  }
+  for (const std::string value : { "-1", "1.5", "x", "" })
+  {
+    const Outcome outcome = run("homing --seed " + value);
+    EXPECT_NE(outcome.status, 0) << value;
+    expectContains(outcome.err, "--seed");
+  }
+}
+
+TEST(Experiments, SaysSeedAndRuns)
+{
+  const Outcome outcome = run("multi_hypothesis --short --runs 1 --seed 7");
+  expectContains(outcome.out, "multi_hypothesis: seed 7, 1 scenes\n");
+  expectContains(run("multi_hypothesis --short --runs 1").out, "multi_hypothesis: seed 1, 1 scenes\n");
+}
+
+TEST(ExperimentContext, ItsOwnSeedAndRunsAreTheDefault)
+{
+  constexpr Repetition REPETITION{ "runs", 20, 3, 5 };
+  ExperimentContext context;
+  EXPECT_EQ(context.runsOf(REPETITION), 20);
+  EXPECT_EQ(context.seedOf(REPETITION, 1000), 1000U);
+  context.seed = 5;
+  EXPECT_EQ(context.seedOf(REPETITION, 1000), 1000U);
+  context.seed = 6;
+  EXPECT_NE(context.seedOf(REPETITION, 1000), 1000U);
+  EXPECT_NE(context.seedOf(REPETITION, 1000), context.seedOf(REPETITION, 1001));
+  context.brief = true;
+  EXPECT_EQ(context.runsOf(REPETITION), 3);
+  context.runs = 7;
+  EXPECT_EQ(context.runsOf(REPETITION), 7);
+}
+
+TEST(ExperimentContext, AnotherSeedDrawsAnotherScene)
+{
+  const auto correct = [](std::optional<std::uint64_t> seed) {
+    ExperimentContext context;
+    context.brief = true;
+    context.runs = 1;
+    context.seed = seed;
+    std::ostringstream csv;
+    runMultiHypothesisExperiment(context, csv);
+    std::vector<std::string> column;
+    for (const test::Row& row : test::readTable(csv.str()))
+    {
+      EXPECT_EQ(row.at("runs"), "1");
+      column.push_back(row.at("entries_over_half"));
+      column.push_back(row.at("correct"));
+    }
+    return column;
+  };
+  const std::vector<std::string> usual = correct({});
+  EXPECT_EQ(correct(HYPOTHESIS_SCENES.seed), usual);
+  EXPECT_NE(correct(2), usual);
+}
+
+}  // namespace view_servo
