@@ -17,8 +17,8 @@
 #include "experiments/line_ground_truth.h"
 #include "view_servo/geometry/fundamental.h"
 #include "view_servo/images/image_io.h"
+#include "view_servo/parameters/parameter.h"
 #include "view_servo/views/line_view_matcher.h"
-#include "view_servo/views/matcher_parameters.h"
 
 #include <Eigen/Geometry>
 #include <opencv2/core.hpp>
@@ -375,7 +375,7 @@ int main(int argc, char** argv)
       }
       else if (arguments[i] == "--set" && equals != std::string::npos)
       {
-        setParameter(params, value.substr(0, equals), value.substr(equals + 1));
+        setParameter(parameters(params), value.substr(0, equals), value.substr(equals + 1));
       }
       else
       {

@@ -12,7 +12,7 @@
  *   means a corner error under 5 px.
  * - time: medians of a whole match, and of one against a stored reference, as ratios to SIFT's.
  */
-#include "view_servo/views/matcher_parameters.h"
+#include "view_servo/parameters/parameter.h"
 #include "view_servo/views/point_view_matcher.h"
 
 #include <Eigen/Geometry>
@@ -516,7 +516,7 @@ int main(int argc, char** argv)
       }
       else if (option == "--set" && equals != std::string::npos)
       {
-        setParameter(params, value.substr(0, equals), value.substr(equals + 1));
+        setParameter(parameters(params), value.substr(0, equals), value.substr(equals + 1));
       }
       else
       {

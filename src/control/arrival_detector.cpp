@@ -52,14 +52,21 @@ double gradientSimilarity(const cv::Mat& reference, const cv::Mat& current)
          scale;
 }
 
+std::vector<Parameter> parameters(ArrivalDetectorParams& params)
+{
+  return {
+    real("arrival_rise", params.rise, "", "> 0",
+         "thesis: a rise of the correlation counts as sudden when it exceeds this many standard deviations of those "
+         "before it"),
+    real("arrival_min_rise", params.min_rise, "", "> 0", "thesis: and when it is at least this large"),
+    real("arrival_drop", params.drop, "", "(0, 1)", "thesis: part of the rise that is lost again past the view"),
+    integer("arrival_min_history", params.min_history, "", ">= 2", "thesis: correlations before any rise counts"),
+  };
+}
+
 std::vector<std::string> ArrivalDetectorParams::validate() const
 {
-  Faults faults;
-  faults.require(rise > 0.0, "arrival_rise must be positive");
-  faults.require(min_rise > 0.0, "arrival_min_rise must be positive");
-  faults.require(drop > 0.0 && drop < 1.0, "arrival_drop must lie in (0, 1)");
-  faults.require(min_history >= 2, "arrival_min_history must be at least 2");
-  return faults.list();
+  return faultsOf(*this);
 }
 
 Arrival ArrivalDetector::add(double similarity)

@@ -2,8 +2,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "view_servo/control/heading_hypotheses.h"
 
-#include "view_servo/parameters/faults.h"
 #include "view_servo/geometry/fundamental.h"
+#include "view_servo/parameters/faults.h"
 #include "view_servo/robust/planar_motion_estimator.h"
 #include "view_servo/robust/ransac.h"
 #include "view_servo/robust/relative_pose_estimator.h"
@@ -64,16 +64,26 @@ bool same(const PlanarPose& a, const PlanarPose& b)
 
 }  // namespace
 
+std::vector<Parameter> parameters(HeadingHypothesesParams& params)
+{
+  return {
+    choice<CameraMotion>("motion", params.motion,
+                         { { "planar", CameraMotion::PLANAR }, { "free", CameraMotion::FREE } },
+                         "how the camera moves; free: headings only, no docking"),
+    real("inlier_threshold", params.inlier_threshold, "px", "> 0", "largest error of a match that supports a motion"),
+    real("max_yaw", params.max_yaw, "rad", "(0, pi/2)", "largest turn between the views"),
+    real("min_significance", params.min_significance, "", ">= 0", "-log10 of the false alarms of a motion"),
+    real("memory", params.memory, "", "[0, 1)",
+         "part of its weight that a hypothesis keeps from one set of matches to the next"),
+    integer("max_hypotheses", params.max_hypotheses, "", ">= 1", "hypotheses kept"),
+    real("assumed_distance", params.assumed_distance, "m", "> 0", "distance of the view until it is known"),
+    natural("seed", params.seed, "of all random draws"),
+  };
+}
+
 std::vector<std::string> HeadingHypothesesParams::validate() const
 {
-  Faults faults;
-  faults.require(inlier_threshold > 0.0, "inlier_threshold must be more than 0 px");
-  faults.require(max_yaw > 0.0 && max_yaw < M_PI_2, "max_yaw must lie in (0, pi/2)");
-  faults.require(min_significance >= 0.0, "min_significance must be at least 0");
-  faults.require(memory >= 0.0 && memory < 1.0, "memory must lie in [0, 1)");
-  faults.require(max_hypotheses >= 1, "max_hypotheses must be at least 1");
-  faults.require(assumed_distance > 0.0, "assumed_distance must be more than 0 m");
-  return faults.list();
+  return faultsOf(*this);
 }
 
 HeadingHypotheses::HeadingHypotheses(const HeadingHypothesesParams& params, double focal_length)

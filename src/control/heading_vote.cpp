@@ -2,8 +2,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "view_servo/control/heading_vote.h"
 
-#include "view_servo/parameters/faults.h"
 #include "view_servo/geometry/planar_motion.h"
+#include "view_servo/parameters/faults.h"
 
 #include <algorithm>
 #include <cmath>
@@ -37,17 +37,27 @@ std::vector<double> smoothed(const std::vector<double>& votes, double sd)
 
 }  // namespace
 
+std::vector<Parameter> parameters(HeadingVoteParams& params)
+{
+  return {
+    integer("heading_bins", params.bins, "", ">= 3", "bins of the histogram of headings"),
+    real("heading_margin", params.margin, "rad", "[0, pi/2)", "headings nearer to +-pi/2 are not taken"),
+    real("heading_smoothing", params.smoothing, "rad", "[0, pi/2)", "standard deviation that votes are spread by"),
+    real("roi_narrowing", params.narrowing, "", "(0, 1]",
+         "factor of the region of interest when the highest peak is inside"),
+    real("roi_widening", params.widening, "", ">= 1", "factor of the region of interest when it is not"),
+    real("roi_min_half_width", params.min_half_width, "rad", "(0, pi/2)", "least half width of the region of interest"),
+  };
+}
+
 std::vector<std::string> HeadingVoteParams::validate() const
 {
-  Faults faults;
-  faults.require(bins >= 3, "heading_bins must be at least 3");
-  faults.require(margin >= 0.0 && margin < M_PI_2, "heading_margin must lie in [0, pi/2)");
-  faults.require(smoothing >= 0.0 && smoothing < M_PI_2, "heading_smoothing must lie in [0, pi/2)");
-  faults.require(narrowing > 0.0 && narrowing <= 1.0, "roi_narrowing must lie in (0, 1]");
-  faults.require(widening >= 1.0, "roi_widening must be at least 1");
-  faults.require(min_half_width > 0.0 && min_half_width < M_PI_2, "roi_min_half_width must lie in (0, pi/2)");
-  faults.require(!(min_half_width > M_PI_2 - margin), "roi_min_half_width must leave room for heading_margin");
-  return faults.list();
+  std::vector<std::string> faults = faultsOf(*this);
+  if (min_half_width > M_PI_2 - margin)
+  {
+    faults.emplace_back("roi_min_half_width must leave room for heading_margin");
+  }
+  return faults;
 }
 
 HeadingHistogram::HeadingHistogram(const HeadingEvidence& evidence, double yaw, const HeadingVoteParams& params)

@@ -2,8 +2,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "view_servo/control/homing.h"
 
-#include "view_servo/parameters/faults.h"
 #include "view_servo/geometry/fundamental.h"
+#include "view_servo/parameters/faults.h"
 
 #include <algorithm>
 #include <cmath>
@@ -431,6 +431,32 @@ private:
   int contradictions_ = 0;
 };
 
+/** The parameters that no part of homing has by itself. */
+std::vector<Parameter> rowsOfHoming(HomingParams& params)
+{
+  return {
+    choice<HomingMode>("mode", params.mode, { { "servo", HomingMode::SERVO }, { "thesis", HomingMode::THESIS } },
+                       "how to home"),
+    real("lost_timeout", params.lost_timeout, "s", "> 0", "time without a trace of the view, after which it gives up"),
+    real("gain", params.gain, "1/s", "> 0", "speed per distance"),
+    real("turn_gain", params.turn_gain, "1/s", "> 0", "turn rate per yaw error"),
+    real("blind_speed", params.blind_speed, "m/s", "> 0", "speed while only the heading is known"),
+    real("distance_tolerance", params.distance_tolerance, "m", "> 0", "distance from the view at which it has arrived"),
+    real("yaw_tolerance", params.yaw_tolerance, "rad", "> 0", "yaw error at which it has arrived"),
+    real("dwell", params.dwell, "s", ">= 0", "time that it has to stay within the tolerances"),
+    real("arrival_distance", params.arrival_distance, "m", "> 0",
+         "distance at which the heading is published as ARRIVED"),
+    real("arrival_yaw", params.arrival_yaw, "rad", "> 0", "yaw error at which the heading is published as ARRIVED"),
+    real("min_similarity", params.min_similarity, "", "[-1, 1)",
+         "least correlation of the gradients where homing may end"),
+    real("docking_displacement", params.docking_displacement, "px", "> 0",
+         "median displacement of the view's points below which homing docks"),
+    real("step", params.step, "m", "> 0", "thesis: way between two headings"),
+    real("near_step", params.near_step, "m", "> 0", "thesis: the same after the rise of the correlation"),
+    real("step_speed", params.step_speed, "m/s", "> 0", "thesis: speed of a step"),
+  };
+}
+
 }  // namespace
 
 Progress toProgress(const HomingReport& report)
@@ -451,27 +477,21 @@ Progress toProgress(const HomingReport& report)
   }
 }
 
+std::vector<Parameter> parameters(HomingParams& params)
+{
+  return joined({ rowsOfHoming(params), parameters(params.hypotheses), parameters(params.tracker),
+                  parameters(params.vote), parameters(params.arrival) });
+}
+
 std::vector<std::string> HomingParams::validate() const
 {
+  HomingParams copy = *this;
   Faults faults;
-  faults.add(vote.validate());
+  faults.add(faultsOf(rowsOfHoming(copy)));
   faults.add(hypotheses.validate());
-  faults.add(arrival.validate());
   faults.add(tracker.validate());
-  faults.require(lost_timeout > 0.0, "lost_timeout must be more than 0 s");
-  faults.require(gain > 0.0, "gain must be more than 0 1/s");
-  faults.require(turn_gain > 0.0, "turn_gain must be more than 0 1/s");
-  faults.require(blind_speed > 0.0, "blind_speed must be more than 0 m/s");
-  faults.require(distance_tolerance > 0.0, "distance_tolerance must be more than 0 m");
-  faults.require(yaw_tolerance > 0.0, "yaw_tolerance must be more than 0 rad");
-  faults.require(dwell >= 0.0, "dwell must be at least 0 s");
-  faults.require(arrival_distance > 0.0, "arrival_distance must be more than 0 m");
-  faults.require(arrival_yaw > 0.0, "arrival_yaw must be more than 0 rad");
-  faults.require(docking_displacement > 0.0, "docking_displacement must be more than 0 px");
-  faults.require(min_similarity >= -1.0 && min_similarity < 1.0, "min_similarity must lie in [-1, 1)");
-  faults.require(step > 0.0, "step must be more than 0 m");
-  faults.require(near_step > 0.0, "near_step must be more than 0 m");
-  faults.require(step_speed > 0.0, "step_speed must be more than 0 m/s");
+  faults.add(vote.validate());
+  faults.add(arrival.validate());
   return faults.list();
 }
 

@@ -6,14 +6,19 @@
 
 namespace view_servo
 {
+std::vector<Parameter> parameters(VelocityLimits& params)
+{
+  return {
+    real("max_speed", params.max_speed, "m/s", "> 0", "largest speed"),
+    real("max_turn_rate", params.max_turn_rate, "rad/s", "> 0", "largest turn rate"),
+    real("max_acceleration", params.max_acceleration, "m/s^2", "> 0", "largest change of the velocity"),
+    real("max_turn_acceleration", params.max_turn_acceleration, "rad/s^2", "> 0", "largest change of the turn rate"),
+  };
+}
+
 std::vector<std::string> VelocityLimits::validate() const
 {
-  Faults faults;
-  faults.require(max_speed > 0.0, "max_speed must be more than 0 m/s");
-  faults.require(max_turn_rate > 0.0, "max_turn_rate must be more than 0 rad/s");
-  faults.require(max_acceleration > 0.0, "max_acceleration must be more than 0 m/s^2");
-  faults.require(max_turn_acceleration > 0.0, "max_turn_acceleration must be more than 0 rad/s^2");
-  return faults.list();
+  return faultsOf(*this);
 }
 
 }  // namespace view_servo

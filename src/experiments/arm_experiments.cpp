@@ -6,7 +6,7 @@
 #include "tools/package_folder.h"
 #include "parallel.h"
 #include "trials/arm_trial.h"
-#include "sim/world.h"
+#include "sim/world_reader.h"
 #include "view_servo/robust/random.h"
 
 #include <Eigen/Geometry>

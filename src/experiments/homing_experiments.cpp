@@ -6,6 +6,7 @@
 #include "tools/package_folder.h"
 #include "parallel.h"
 #include "trials/homing_trial.h"
+#include "sim/world_reader.h"
 #include "view_servo/control/heading_hypotheses.h"
 #include "view_servo/geometry/camera.h"
 #include "view_servo/robust/random.h"
@@ -251,10 +252,7 @@ void runDirectionsExperiment(const ExperimentContext& context, std::ostream& csv
     if (hypotheses.list().empty())
     {
       // Where there is too little texture.
-      hypotheses.update(onUnitPlane(lines.match(reference.lines(), current.lines(), GeometryModel::HOMOGRAPHY,
-                                                LineGrouping::TRIPLETS),
-                                    walk.camera),
-                        {});
+      hypotheses.update(onUnitPlane(lines.match(reference, current), walk.camera), {});
     }
     const Eigen::Isometry3d truth = walk.poses.at(pair.current).inverse() * walk.poses.at(pair.reference);
     const double true_heading = std::atan2(-truth.translation().x(), truth.translation().z());

@@ -145,23 +145,22 @@ Eigen::Vector2d refinePeak(const cv::Mat& response, const Peak& peak)
 
 }  // namespace
 
+std::vector<Parameter> parameters(CornerParams& params)
+{
+  return {
+    integer("max_corners", params.max_corners, "", "[1, 5000]", "corners kept in each image, strongest first"),
+    real("derivative_sigma", params.derivative_sigma, "px", "(0, 20]", "scale of the Harris detector's derivatives"),
+    real("integration_sigma", params.integration_sigma, "px", "(0, 20]", "scale of the Harris detector's window"),
+    real("harris_k", params.k, "", "[0, 0.25)", "k in R = det(M) - k tr(M)^2"),
+    real("corner_distance", params.min_distance, "px", "[0, 1000]", "smallest distance between corners"),
+    real("corner_threshold", params.relative_threshold, "", "[0, 1)", "smallest response, as a part of the strongest"),
+    integer("corner_border", params.border, "px", ">= 1", "no corners closer to the image's border"),
+  };
+}
+
 std::vector<std::string> CornerParams::validate() const
 {
-  std::vector<std::string> faults;
-  const auto require = [&](bool good, const char* fault) {
-    if (!good)
-    {
-      faults.emplace_back(fault);
-    }
-  };
-  require(max_corners >= 1, "max_corners must be at least 1");
-  require(derivative_sigma > 0.0 && derivative_sigma <= 20.0, "derivative_sigma must lie in (0, 20] px");
-  require(integration_sigma > 0.0 && integration_sigma <= 20.0, "integration_sigma must lie in (0, 20] px");
-  require(k >= 0.0 && k < 0.25, "harris_k must lie in [0, 0.25)");
-  require(min_distance >= 0.0 && min_distance <= 1000.0, "min_distance must lie in [0, 1000] px");
-  require(relative_threshold >= 0.0 && relative_threshold < 1.0, "relative_threshold must lie in [0, 1)");
-  require(border >= 1, "border must be at least 1 px");
-  return faults;
+  return faultsOf(*this);
 }
 
 std::vector<Corner> detectCorners(const cv::Mat& image, const CornerParams& params, const cv::Mat& mask)

@@ -274,20 +274,25 @@ private:
 
 }  // namespace
 
+std::vector<Parameter> edgeParameters(double& sigma, double& low_threshold, double& high_threshold)
+{
+  return {
+    real("edge_sigma", sigma, "px", "[0.6, 20]", "scale of the edges: about 1 for fine, 2 for coarse ones"),
+    real("edge_low_threshold", low_threshold, "grey levels/px", "> 0", "canny: least slope all along an edge"),
+    real("edge_high_threshold", high_threshold, "grey levels/px", ">= edge_low_threshold",
+         "canny: least slope somewhere on an edge"),
+  };
+}
+
+std::vector<Parameter> parameters(EdgeParams& params)
+{
+  return joined({ edgeParameters(params.sigma, params.low_threshold, params.high_threshold),
+                  { integer("edge_min_points", params.min_points, "", ">= 2", "pixels of the shortest edge") } });
+}
+
 std::vector<std::string> EdgeParams::validate() const
 {
-  std::vector<std::string> faults;
-  const auto require = [&](bool good, const char* fault) {
-    if (!good)
-    {
-      faults.emplace_back(fault);
-    }
-  };
-  require(sigma >= 0.6 && sigma <= 20.0, "sigma must lie in [0.6, 20] px");
-  require(low_threshold > 0.0, "low_threshold must be over 0 grey levels/px");
-  require(high_threshold >= low_threshold, "high_threshold must be at least low_threshold");
-  require(min_points >= 2, "min_points must be at least 2");
-  return faults;
+  return faultsOf(*this);
 }
 
 std::vector<EdgeChain> detectEdges(const cv::Mat& grey, const EdgeParams& params, const cv::Rect& region)

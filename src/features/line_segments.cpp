@@ -275,29 +275,32 @@ bool lsdAvailable()
   return LSD_AVAILABLE;
 }
 
+std::vector<Parameter> parameters(LineSegmentParams& params)
+{
+  return joined(
+      { { choice<SegmentDetector>("detector", params.detector,
+                                  { { "canny", SegmentDetector::CANNY }, { "lsd", SegmentDetector::LSD } },
+                                  "subdivided edges, or OpenCV's Line Segment Detector") },
+        edgeParameters(params.sigma, params.low_threshold, params.high_threshold),
+        {
+            real("segment_deviation", params.min_deviation, "px", "> 0",
+                 "canny: smaller deviations from a straight line are noise"),
+            real("segment_max_deviation", params.max_deviation, "px", ">= segment_deviation",
+                 "canny: largest deviation of a segment's edge from its line"),
+            real("segment_significance", params.min_significance, "", ">= 0",
+                 "canny: least length over greatest deviation"),
+            real("segment_min_length", params.min_length, "px", "(0, 10000]", "shortest segment detected"),
+            integer("max_segments", params.max_segments, "", ">= 1", "segments detected in each image, the longest"),
+        } });
+}
+
 std::vector<std::string> LineSegmentParams::validate() const
 {
-  EdgeParams edges;
-  edges.sigma = sigma;
-  edges.low_threshold = low_threshold;
-  edges.high_threshold = high_threshold;
-  std::vector<std::string> faults;
-  for (const std::string& fault : edges.validate())
+  std::vector<std::string> faults = faultsOf(*this);
+  if (detector == SegmentDetector::LSD && !LSD_AVAILABLE)
   {
-    faults.push_back("edge_" + fault);
+    faults.emplace_back("OpenCV " CV_VERSION " has no Line Segment Detector");
   }
-  const auto require = [&](bool good, const char* fault) {
-    if (!good)
-    {
-      faults.emplace_back(fault);
-    }
-  };
-  require(min_deviation > 0.0, "segment_deviation must be over 0 px");
-  require(max_deviation >= min_deviation, "segment_max_deviation must be at least segment_deviation");
-  require(min_significance >= 0.0, "segment_significance must be at least 0");
-  require(min_length > 0.0 && min_length <= 10000.0, "segment_min_length must lie in (0, 10000] px");
-  require(max_segments >= 1, "max_segments must be at least 1");
-  require(detector != SegmentDetector::LSD || LSD_AVAILABLE, "OpenCV " CV_VERSION " has no Line Segment Detector");
   return faults;
 }
 

@@ -211,21 +211,24 @@ void normalize(ProfileSet& set)
 
 }  // namespace
 
+std::vector<Parameter> parameters(ProfileParams& params)
+{
+  return {
+    choice<PairSelection>("pair_selection", params.selection,
+                          { { "nearest", PairSelection::NEAREST }, { "radius", PairSelection::RADIUS } },
+                          "pair each corner with its nearest (K_c) or with all in a radius (D_c)"),
+    integer("pair_neighbours", params.neighbours, "", ">= 1", "K_c: corners that each is paired with"),
+    real("pair_radius", params.max_length, "px", "> profile_min_length", "D_c: longest profile"),
+    real("profile_min_length", params.min_length, "px", ">= 2", "shortest profile"),
+    integer("coefficients", params.coefficients, "", "4, 6 or 8", "N_f: Fourier features a profile"),
+    real("profile_contrast", params.min_contrast, "grey levels", "(0, 255)",
+         "least deviation of a profile from its mean"),
+  };
+}
+
 std::vector<std::string> ProfileParams::validate() const
 {
-  std::vector<std::string> faults;
-  const auto require = [&](bool good, const char* fault) {
-    if (!good)
-    {
-      faults.emplace_back(fault);
-    }
-  };
-  require(neighbours >= 1, "profile_neighbours must be at least 1");
-  require(min_length >= 2.0, "min_length must be at least 2 px");
-  require(max_length > min_length, "max_length must be larger than min_length");
-  require(coefficients == 4 || coefficients == 6 || coefficients == 8, "coefficients must be 4, 6 or 8");
-  require(min_contrast > 0.0 && min_contrast < 255.0, "min_contrast must lie in (0, 255) grey levels");
-  return faults;
+  return faultsOf(*this);
 }
 
 ProfileSet extractProfiles(const cv::Mat& image, const std::vector<Corner>& corners, const ProfileParams& params)

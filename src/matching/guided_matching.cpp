@@ -117,18 +117,17 @@ double vertex(float before, float middle, float after)
 
 }  // namespace
 
+std::vector<Parameter> parameters(GuidedParams& params)
+{
+  return {
+    integer("patch_radius", params.patch_radius, "px", "[1, 50]", "patches compared by guided matching"),
+    real("patch_correlation", params.min_correlation, "", "[0, 1)", "least correlation of the patches"),
+  };
+}
+
 std::vector<std::string> GuidedParams::validate() const
 {
-  std::vector<std::string> faults;
-  if (patch_radius < 1 || patch_radius > 50)
-  {
-    faults.emplace_back("patch_radius must lie in [1, 50] px");
-  }
-  if (!(min_correlation >= 0.0 && min_correlation < 1.0))
-  {
-    faults.emplace_back("patch_correlation must lie in [0, 1)");
-  }
-  return faults;
+  return faultsOf(*this);
 }
 
 std::vector<GuidedMatch> searchAlongHomography(const cv::Mat& reference, const std::vector<Corner>& corners,

@@ -48,22 +48,22 @@ std::pair<double, double> offsets(const Eigen::Vector2d& direction, const Segmen
 
 }  // namespace
 
+std::vector<Parameter> parameters(LineFeatureParams& params)
+{
+  return joined(
+      { parameters(params.groups),
+        {
+            integer("max_grouped", params.max_grouped, "", "[1, 5000]", "segments that form groups, the longest"),
+            integer("neighbours", params.neighbours, "", "[6, 1000]",
+                    "nearest segments of each that judge a hypothesis"),
+            integer("neighbour_pairs", params.neighbour_pairs, "", "[2, 100]",
+                    "nearest segments of each that make one"),
+        } });
+}
+
 std::vector<std::string> LineFeatureParams::validate() const
 {
-  std::vector<std::string> faults = groups.validate();
-  if (max_grouped < 1 || max_grouped > 5000)
-  {
-    faults.emplace_back("max_grouped must lie in [1, 5000]");
-  }
-  if (neighbours < 6 || neighbours > 1000)
-  {
-    faults.emplace_back("neighbours must lie in [6, 1000]");
-  }
-  if (neighbour_pairs < 2 || neighbour_pairs > 100)
-  {
-    faults.emplace_back("neighbour_pairs must lie in [2, 100]");
-  }
-  return faults;
+  return faultsOf(*this);
 }
 
 LineFeatures::LineFeatures(const cv::Mat& grey, Segments segments, const LineFeatureParams& params)

@@ -357,30 +357,24 @@ std::vector<float> votesOf(const LineIndex& reference, std::vector<LineGroup>::c
 
 }  // namespace
 
+std::vector<Parameter> parameters(LineGroupParams& params)
+{
+  return {
+    choice<LineOrder>("line_order", params.order,
+                      { { "contrast", LineOrder::CONTRAST }, { "upright", LineOrder::UPRIGHT } },
+                      "which end is first: bright side left (free of roll), or upwards and to the right"),
+    real("group_distance", params.max_distance, "px", "> 0", "from each segment of a pair to where their lines meet"),
+    real("group_collinearity", params.collinearity, "px", ">= 0", "a point this close to a line counts as on it"),
+    real("group_min_angle_deg", params.min_angle_deg, "degrees", "(0, 90)", "least angle between the lines of a pair"),
+    integer("group_neighbours", params.max_neighbours, "", ">= 0",
+            "pairs that a segment forms, the closest, 0 = no limit"),
+    real("group_min_weight", params.min_weight, "", "[0, 1)", "structures less likely than this are left out"),
+  };
+}
+
 std::vector<std::string> LineGroupParams::validate() const
 {
-  std::vector<std::string> faults;
-  if (!(max_distance > 0.0))
-  {
-    faults.emplace_back("group_distance must be more than 0 px");
-  }
-  if (!(collinearity >= 0.0))
-  {
-    faults.emplace_back("group_collinearity must be at least 0 px");
-  }
-  if (!(min_angle_deg > 0.0 && min_angle_deg < 90.0))
-  {
-    faults.emplace_back("group_min_angle_deg must lie in (0, 90)");
-  }
-  if (max_neighbours < 0)
-  {
-    faults.emplace_back("group_neighbours must be at least 0");
-  }
-  if (!(min_weight >= 0.0 && min_weight < 1.0))
-  {
-    faults.emplace_back("group_min_weight must lie in [0, 1)");
-  }
-  return faults;
+  return faultsOf(*this);
 }
 
 int pairIndex(const Segment& a, const Segment& b, double collinearity)

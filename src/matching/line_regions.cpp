@@ -476,50 +476,30 @@ private:
 
 }  // namespace
 
+std::vector<Parameter> parameters(LineRegionParams& params)
+{
+  return {
+    integer("max_candidates", params.max_candidates, "", ">= 1",
+            "counterparts tried for a segment, those with most votes"),
+    integer("max_trials", params.max_trials, "", ">= 1", "counterparts tried in all, first those that stand out most"),
+    integer("max_companions", params.max_companions, "", ">= 2",
+            "matches of neighbours tried with it, those with most votes"),
+    integer("max_hypotheses", params.max_hypotheses, "", ">= 1", "affine maps tried for a counterpart"),
+    real("affine_tolerance", params.affine_tolerance, "px", "> 0", "of segments under a local affine map, across"),
+    real("region_tolerance", params.tolerance, "px", "> 0", "of segments under a region's homography, across"),
+    real("region_max_angle_deg", params.max_angle_deg, "degrees", "(0, 45)",
+         "largest angle between a mapped segment and its counterpart"),
+    real("region_min_support", params.min_support, "", "> 0", "least sum of a region's matches, whole ones counting 1"),
+    real("min_correlation", params.min_correlation, "", "[-1, 1)",
+         "least correlation of what lies beside two segments, on the better side"),
+    real("min_mean_correlation", params.min_mean_correlation, "", "[-1, 1)",
+         "least mean of it over a region's matches"),
+  };
+}
+
 std::vector<std::string> LineRegionParams::validate() const
 {
-  std::vector<std::string> faults;
-  if (max_candidates < 1)
-  {
-    faults.emplace_back("max_candidates must be at least 1");
-  }
-  if (max_trials < 1)
-  {
-    faults.emplace_back("max_trials must be at least 1");
-  }
-  if (max_companions < 2)
-  {
-    faults.emplace_back("max_companions must be at least 2");
-  }
-  if (max_hypotheses < 1)
-  {
-    faults.emplace_back("max_hypotheses must be at least 1");
-  }
-  if (!(affine_tolerance > 0.0))
-  {
-    faults.emplace_back("affine_tolerance must be more than 0 px");
-  }
-  if (!(tolerance > 0.0))
-  {
-    faults.emplace_back("region_tolerance must be more than 0 px");
-  }
-  if (!(max_angle_deg > 0.0 && max_angle_deg < 45.0))
-  {
-    faults.emplace_back("region_max_angle_deg must lie in (0, 45)");
-  }
-  if (!(min_support > 0.0))
-  {
-    faults.emplace_back("region_min_support must be more than 0");
-  }
-  if (!(min_correlation >= -1.0 && min_correlation < 1.0))
-  {
-    faults.emplace_back("min_correlation must lie in [-1, 1)");
-  }
-  if (!(min_mean_correlation >= -1.0 && min_mean_correlation < 1.0))
-  {
-    faults.emplace_back("min_mean_correlation must lie in [-1, 1)");
-  }
-  return faults;
+  return faultsOf(*this);
 }
 
 std::vector<LineRegion> findLineRegions(const LineFeatures& reference, const LineFeatures& current,

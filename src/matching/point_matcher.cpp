@@ -234,26 +234,26 @@ private:
 
 }  // namespace
 
+std::vector<Parameter> parameters(PointMatcherParams& params)
+{
+  return joined(
+      { parameters(params.corners),
+        parameters(params.profiles),
+        parameters(params.search),
+        {
+            choice<AssignmentMethod>("assignment", params.assignment,
+                                     { { "exact", AssignmentMethod::EXACT }, { "greedy", AssignmentMethod::GREEDY } },
+                                     "how candidates are taken from the association"),
+            boolean("cyclic_order", params.cyclic_order, "align the profiles around corners in cyclic order"),
+            real("cyclic_correlation", params.min_correlation, "", "[0, 1)", "least correlation of aligned profiles"),
+            integer("cyclic_entries", params.cyclic_entries, "", ">= 0",
+                    "entries aligned in each row and column, 0 = all"),
+        } });
+}
+
 std::vector<std::string> PointMatcherParams::validate() const
 {
-  std::vector<std::string> faults = corners.validate();
-  for (const std::vector<std::string>& more : { profiles.validate(), search.validate() })
-  {
-    faults.insert(faults.end(), more.begin(), more.end());
-  }
-  if (corners.max_corners > 5000)
-  {
-    faults.emplace_back("max_corners must be at most 5000 for matching");
-  }
-  if (!(min_correlation >= 0.0 && min_correlation < 1.0))
-  {
-    faults.emplace_back("min_correlation must lie in [0, 1)");
-  }
-  if (cyclic_entries < 0)
-  {
-    faults.emplace_back("cyclic_entries must be at least 0");
-  }
-  return faults;
+  return faultsOf(*this);
 }
 
 PointFeatures extractPointFeatures(const cv::Mat& image, const PointMatcherParams& params, const cv::Mat& mask)

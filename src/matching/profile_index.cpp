@@ -115,26 +115,22 @@ std::vector<char> largest(const ProfileSet& profiles, double share)
 
 }  // namespace
 
+std::vector<Parameter> parameters(ProfileSearchParams& params)
+{
+  return {
+    choice<ProfileSearch>("search", params.search,
+                          { { "nearest", ProfileSearch::NEAREST }, { "radius", ProfileSearch::RADIUS } },
+                          "a profile votes for its nearest (K_v) or for all in a radius (D_v)"),
+    integer("search_neighbours", params.neighbours, "", "[1, 1000]", "K_v: profiles that each votes for"),
+    real("search_radius", params.radius, "standard deviations", "> 0", "D_v: distance of similar profiles"),
+    real("search_epsilon", params.epsilon, "", ">= 0", "tolerance of the search for the nearest, 0 = exact"),
+    real("search_share", params.share, "", "(0, 1]", "part of the profiles that votes, the most distinctive ones"),
+  };
+}
+
 std::vector<std::string> ProfileSearchParams::validate() const
 {
-  std::vector<std::string> faults;
-  if (neighbours < 1 || neighbours > 1000)
-  {
-    faults.emplace_back("search_neighbours must lie in [1, 1000]");
-  }
-  if (!(radius > 0.0))
-  {
-    faults.emplace_back("search_radius must be positive");
-  }
-  if (!(epsilon >= 0.0))
-  {
-    faults.emplace_back("search_epsilon must be at least 0");
-  }
-  if (!(share > 0.0 && share <= 1.0))
-  {
-    faults.emplace_back("search_share must lie in (0, 1]");
-  }
-  return faults;
+  return faultsOf(*this);
 }
 
 struct ProfileIndex::Tree

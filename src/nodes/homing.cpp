@@ -10,6 +10,7 @@
 #include "view_servo/ros/conversions.h"
 #include "view_servo/ros/driver_node.h"
 #include "view_servo/ros/homing_worker.h"
+#include "view_servo/ros/image_source.h"
 #include "view_servo/ros/transform_source.h"
 #include "view_servo/ros/view_answer.h"
 #include "view_servo/views/view_store.h"
@@ -30,17 +31,7 @@ namespace view_servo
 {
 
 /**
- * Drives a holonomic mobile base back to where a view was stored. Parameters, all private; config/homing.yaml has them
- * with their ranges:
- *  - those of every driver, see DriverNode;
- *  - `~view` (string, default ""): stored view whose direction is estimated while there is no goal, and which a goal
- *    without a name means;
- *  - `~views_dir` (string): as in view_store;
- *  - `~base_frame` (string, default "base_link"), which tf must know the camera's frame in;
- *  - `~image_timeout`, `~odometry_timeout`, `~match_timeout` (double, default 0.25 [s]): without input for so long, by a
- *    steady clock, the base stands still until there is some again;
- *  - `~image_transport`, `~queue_size`, `~max_image_age`: see CameraInput;
- *  - those of homing and of the base's limits, see homingParameters().
+ * Drives a holonomic mobile base back to where a view was stored. Private parameters: see HomingDriverParams.
  *
  * Subscribes:
  *  - `image_raw`, `camera_info`: see CameraInput;
@@ -80,18 +71,18 @@ public:
                                 params.match_timeout)),
       points_("matches", context.resolved("point_matches")),
       lines_("matches", context.resolved("line_matches")),
-      store_(params.views_dir),
+      store_(viewsDir(params.views_dir)),
       output_(context.nodeHandle(), context.commandTopic(), params.base_frame),
       worker_(
           context.resolved("image_raw"),
           [this](const HomingOutcome& outcome) {
-            context_.apply("the outcome of an image", [&] { onOutcome(outcome); });
+            context_.runLocked("the outcome of an image", [&] { onOutcome(outcome); });
           },
           [this](const CameraFrame& frame) { watchView(frame); }),
       camera_(
           context.nodeHandle(), params.camera,
           [this](const CameraFrame& frame) {
-            context_.apply("an image on " + images_.topics(), [&] { onFrame(frame); });
+            context_.runLocked("an image on " + images_.topics(), [&] { onFrame(frame); });
           },
           [this](const std::string& problem) { context_.locked([&] { images_.reject(problem); }); })
   {
@@ -120,14 +111,14 @@ public:
     }
     const StoredView stored = store_.load(view);
     context_.locked([&] { want(view, context_.goalId()); });
-    context_.wantView(view);
+    context_.requestView(view);
     // Only an image that has come since: the camera may be another than it was.
     CameraFrame before;
     CameraFrame frame;
     camera_.missing(before);
-    context_.require([&] { return camera_.missing(frame, before); });
-    context_.require([this] { return context_.locked([this] { return odometryLacks(); }); });
-    context_.require(
+    context_.waitFor([&] { return camera_.missing(frame, before); });
+    context_.waitFor([this] { return context_.locked([this] { return odometryLacks(); }); });
+    context_.waitFor(
         [&] { return transforms_.missing(params_.base_frame, frame.image->header.frame_id, ros::Time(0)); });
     HomingParams homing = params_.homing;
     if (goal.step > 0.0)
@@ -136,19 +127,19 @@ public:
       homing.near_step = std::min(homing.near_step, goal.step);
     }
     auto task = std::make_unique<Task>(makeTask(stored, frame, homing));
-    context_.require([this] { return context_.locked([this] { return missingAnswer({ &points_, &lines_ }); }); });
+    context_.waitFor([this] { return context_.locked([this] { return missingAnswer({ &points_, &lines_ }); }); });
     return task;
   }
 
   void begin(std::unique_ptr<Task> task)
   {
-    start(*task);
+    setTask(*task);
     travelled_ = 0.0;
   }
 
   void end()
   {
-    start(nullptr);
+    setTask(nullptr);
     want(params_.view, "");
   }
 
@@ -172,13 +163,13 @@ public:
   static void sent(double /*time*/, const Velocity& /*velocity*/)
   {
   }
-  static void stands(double /*time*/, const std::string& /*why*/)
+  static void onMissingInput(double /*time*/, const std::string& /*why*/)
   {
   }
 
-  bool heard() const
+  bool hasListener() const
   {
-    return output_.heard();
+    return output_.hasListener();
   }
 
   void publish(const Velocity& velocity) const
@@ -186,7 +177,7 @@ public:
     output_.publish(velocity);
   }
 
-  std::optional<double> answered()
+  std::optional<double> takeLatency()
   {
     const std::optional<Clock::time_point> time = std::exchange(unanswered_, std::nullopt);
     return time ? std::optional<double>(1e3 * std::chrono::duration<double>(Clock::now() - *time).count())
@@ -229,15 +220,15 @@ private:
     lines_.want(view, goal);
   }
 
-  /** Works for another task from now on; empty: none. */
-  void start(std::shared_ptr<HomingTask> task)
+  /** Replaces the task, and forgets all that belongs to the old one; null: no task. */
+  void setTask(std::shared_ptr<HomingTask> task)
   {
     task_ = std::move(task);
     report_ = HomingReport();
     course_ = Course();
     unanswered_.reset();
     odd_stamps_ = 0;
-    worker_.start(task_);
+    worker_.setTask(task_);
   }
 
   // --------------------------------------------------------------------------------------- what a goal waits for
@@ -272,7 +263,7 @@ private:
     if (!input.jump().empty())
     {
       context_.abort(input.jump());
-      start(nullptr);
+      setTask(nullptr);
     }
     return usable;
   }
@@ -287,7 +278,7 @@ private:
     if (task_ && !sameCalibration(*task_->info, *frame.info))
     {
       context_.abort("the camera's calibration has changed");
-      start(nullptr);
+      setTask(nullptr);
     }
     const std::string apart = stampsApart(odometry_, images_);
     odd_stamps_ = apart.empty() ? 0 : odd_stamps_ + 1;
@@ -346,7 +337,7 @@ private:
     if (!outcome.fault.empty())
     {
       context_.abort("an image or matches cannot be used: " + outcome.fault);
-      start(nullptr);
+      setTask(nullptr);
       return;
     }
     report_ = outcome.report;
@@ -361,7 +352,7 @@ private:
     const bool ended = report_.state == HomingState::ARRIVED || report_.state == HomingState::FAILED;
     if (ended && !context_.goalRuns())
     {
-      start(nullptr);  // watched anew with the next image
+      setTask(nullptr);  // watched anew with the next image
     }
   }
 
@@ -377,10 +368,10 @@ private:
     try
     {
       const std::shared_ptr<HomingTask> task = makeTask(store_.load(params_.view), frame, params_.homing);
-      context_.apply("the watch for a view", [&] {
+      context_.runLocked("the watch for a view", [&] {
         if (!task_ && context_.goalId().empty())
         {
-          start(task);
+          setTask(task);
         }
       });
     }

@@ -5,6 +5,7 @@
 #include "view_servo/ros/camera_input.h"
 #include "view_servo/ros/conversions.h"
 #include "view_servo/ros/node_base.h"
+#include "view_servo/ros/node_params.h"
 #include "view_servo/ros/parameters.h"
 #include "view_servo/ros/plane_searcher.h"
 #include "view_servo/ros/plane_session.h"
@@ -41,39 +42,26 @@ namespace
 {
 using Clock = std::chrono::steady_clock;
 
-struct Params
+/** Those of matching have a sub-namespace, as patch_radius and others mean something else in tracking. */
+HomographyTrackerNodeParams readTrackerParams(const ros::NodeHandle& private_nh)
 {
-  CameraInputParams camera;
-  SessionStarterParams sessions;
-  std::string view;
-  double match_period = 0.3;
-  PointViewMatcherParams matching;
-
-  static Params read(const ros::NodeHandle& private_nh)
-  {
-    Params params;
-    ParameterReader reader(private_nh);
-    params.camera = CameraInputParams::read(reader);
-    params.sessions = SessionStarterParams::read(reader);
-    reader.read("view", params.view);
-    reader.require(params.view.empty() || isValidViewName(params.view),
-                   "~view: '" + params.view + "' is not a view's name");
-    reader.read("match_period", params.match_period);
-    reader.require(params.match_period > 0.0, "~match_period must be more than 0 s");
-    params.matching = readMatcherParams(reader, "matching");
-    reader.finish();
-    return params;
-  }
-};
+  HomographyTrackerNodeParams params;
+  ParameterReader reader(private_nh);
+  reader.read(parameters(params));
+  reader.read(parameters(params.matching), "matching");
+  reader.addFaults(params.validate());
+  reader.finish();
+  return params;
+}
 
 /** What is to be followed. */
 struct Task
 {
   ChosenView chosen;
-  std::uint64_t number = 0;  // another one for each choice
+  std::uint64_t number = 0;  // counts choices
 };
 
-/** For diagnostics. */
+/** What diagnostics report. */
 struct Status
 {
   TrackingState state = TrackingState::SEARCHING;
@@ -90,12 +78,7 @@ std::string nameOf(TrackingState state)
 
 /**
  * Follows the plane of a stored view through the images of a moving camera, and publishes its homography, the camera's motion
- * from the view and the plane itself. Parameters, all private; config/homography_tracker.yaml has them with their ranges:
- *  - `~view` (string, default ""): stored view that is followed from the start;
- *  - `~views_dir`, `~odom_frame`, `~tf_patience` and those of tracking: see SessionStarter;
- *  - `~match_period` (double, default 0.3 [s]): from one search for the view to the next;
- *  - `~matching/...`: how the view is found, see matcherParameters();
- *  - `~image_transport`, `~queue_size`, `~max_image_age`: see CameraInput.
+ * from the view and the plane itself. Private parameters: see HomographyTrackerNodeParams.
  *
  * Subscribes:
  *  - `image_raw`, `camera_info`: see CameraInput; tf;
@@ -124,7 +107,7 @@ class HomographyTrackerNode : private NodeBase
 public:
   HomographyTrackerNode(const ros::NodeHandle& nh, const ros::NodeHandle& private_nh)
     : NodeBase(nh, private_nh),
-      params_(Params::read(private_nh)),
+      params_(readTrackerParams(private_nh)),
       finder_(params_.matching),
       searcher_(finder_, params_.match_period),
       camera_(nh, params_.camera, [this](const CameraFrame& frame) { onFrame(frame); }),
@@ -137,7 +120,7 @@ public:
     {
       const std::lock_guard<std::mutex> lock(mutex_);
       choice_.choose(params_.view);
-      begin(nullptr);
+      onChoice(nullptr);
     }
     wanted_subscriber_ = subscribe<WantedView>("wanted_view", 5,
                                                [this](const WantedView::ConstPtr& message) { onWantedView(*message); });
@@ -171,7 +154,7 @@ private:
     {
       const std::lock_guard<std::mutex> lock(mutex_);
       choice_.choose(request.view);
-      begin(std::move(preparation.session));
+      onChoice(std::move(preparation.session));
     }
     response.success = true;
     response.message = "follows view '" + request.view + "'" +
@@ -184,7 +167,7 @@ private:
     const std::lock_guard<std::mutex> lock(mutex_);
     const std::string view = choice_.chosen().view;
     choice_.choose("");
-    begin(nullptr);
+    onChoice(nullptr);
     response.success = true;
     response.message = view.empty() ? "no view was followed" : "view '" + view + "' is not followed any more";
     ROS_INFO_STREAM(response.message);
@@ -195,13 +178,13 @@ private:
     const std::lock_guard<std::mutex> lock(mutex_);
     if (choice_.want(message))
     {
-      begin(nullptr);
+      onChoice(nullptr);
       ROS_INFO_STREAM("wanted: view '" << message.view << "', goal '" << message.goal << "'");
     }
   }
 
-  /** Another choice is made. The mutex is held. @param session when it is prepared already. */
-  void begin(std::unique_ptr<PlaneSession> session)
+  /** Has the follower turn to the choice just made. The mutex is held. @param session null: not prepared yet. */
+  void onChoice(std::unique_ptr<PlaneSession> session)
   {
     prepared_ = std::move(session);
     ++task_number_;
@@ -299,7 +282,7 @@ private:
   {
     const Clock::time_point begin_time = Clock::now();
     const std_msgs::Header& header = frame.image->header;
-    if (!session_->isOf(*frame.info))
+    if (!session_->checkCalibration(*frame.info))
     {
       const std::string reason = "the camera's calibration has changed";
       ROS_ERROR_STREAM_THROTTLE(10.0, reason << ": view '" << task.chosen.view << "' has to be chosen anew");
@@ -309,7 +292,7 @@ private:
     }
     const cv::Mat image = toGrey(*frame.image, camera_.imageTopic());
     std::string news;
-    const std::string jump = session_->advance(header.stamp);
+    const std::string jump = session_->checkTime(header.stamp);
     if (!jump.empty())
     {
       ROS_WARN_STREAM(jump << ": the view is looked for anew");
@@ -350,9 +333,9 @@ private:
   // ----------------------------------------------------------------------------------------------------- publishing
 
   /**
-   * For logs, diagnostics and messages.
-   * @param news why the view is not tracked; empty: as before.
-   * @return why, now; empty when it is tracked.
+   * Updates what diagnostics report, and logs changes.
+   * @param news why the view is not tracked; empty: the reason is the same as before.
+   * @return why the view is not tracked; empty when it is.
    */
   std::string updateStatus(const Task& task, const PlaneTrack& track, const std::string& news)
   {
@@ -435,7 +418,7 @@ private:
   static constexpr std::chrono::seconds NO_IMAGE_AFTER{ 2 };
   static constexpr const char* LOOKS_FOR_IT = "looks for the view";
 
-  const Params params_;
+  const HomographyTrackerNodeParams params_;
   const PlaneFinder finder_;
 
   std::mutex mutex_;  // guards what follows; never held while an image is worked on or a view is read
@@ -454,7 +437,7 @@ private:
   PlaneSearcher searcher_;
   std::unique_ptr<PlaneSession> session_;
   Clock::time_point last_frame_;  // or when the session began
-  std::uint64_t era_ = 0;         // another one for each session, and when time goes back
+  std::uint64_t era_ = 0;         // counts sessions, and times that time went back
   struct
   {
     std::uint64_t number = 0;

@@ -8,7 +8,6 @@
 #include "view_servo/ros/streaming_matcher.h"
 #include "view_servo/views/line_view_matcher.h"
 
-#include <chrono>
 #include <functional>
 #include <limits>
 #include <stdexcept>
@@ -46,11 +45,6 @@ public:
   static constexpr const char* TOPIC = "line_matches";
   static constexpr double RATE = 10.0;  // [Hz]
 
-  static Params readParams(ParameterReader& reader)
-  {
-    return readLineMatcherParams(reader);
-  }
-
   explicit LineMatching(const Params& params) : matcher_(params)
   {
   }
@@ -73,11 +67,7 @@ public:
   ViewMatch match(const PreparedImage& reference, const PreparedImage& current, const Options& options,
                   const std::function<bool()>& /*given_up*/) const
   {
-    using Clock = std::chrono::steady_clock;
-    const Clock::time_point start = Clock::now();
-    ViewMatch result = matcher_.match(reference.lines(), current.lines(), GeometryModel::HOMOGRAPHY, options.groups);
-    result.elapsed_ms = std::chrono::duration<double, std::milli>(Clock::now() - start).count();  // with the detection
-    return result;
+    return matcher_.match(reference, current, GeometryModel::HOMOGRAPHY, options.groups);
   }
 
   static void fill(const ViewMatch& result, Service::Response& response)
@@ -114,7 +104,7 @@ private:
  * Parameters, all private; config/line_matcher.yaml has them with their ranges:
  *  - `~view`, `~rate` (default 10.0 [Hz]), `~views_dir`, `~allow_paths`, `~image_patience`, `~image_transport`, `~queue_size`,
  *    `~max_image_age`: see StreamingMatcher;
- *  - those of the matcher, see matcherParameters().
+ *  - those of the matcher, see parameters(LineMatcherParams&).
  *
  * Subscribes:
  *  - `image_raw` (sensor_msgs/Image), `camera_info` (sensor_msgs/CameraInfo);

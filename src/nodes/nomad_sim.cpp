@@ -1,6 +1,6 @@
 // Copyright (c) 2026, the view_servo authors
 // SPDX-License-Identifier: BSD-3-Clause
-#include "sim/nomad.h"
+#include "sim_ros/nomad_robot.h"
 #include "sim_ros/simulation_node.h"
 
 #include <geometry_msgs/Twist.h>
@@ -9,19 +9,21 @@
 #include <tf2_ros/static_transform_broadcaster.h>
 #include <tf2_ros/transform_broadcaster.h>
 
-#include <cstdint>
+#include <memory>
+#include <optional>
+#include <string>
 
 namespace view_servo::sim
 {
 namespace
 {
 /**
- * The base, as a SimulationNode wants it.
+ * What SimulationNode needs to know of the base.
  *
  * Parameters:
- *  - `~odometry_drift` (double, default 0): distance measured too long, as a part of it;
+ *  - `~odometry_drift` (double, default 0): by which part odometry measures distances too long;
  *  - `~odometry_turn_drift` (double, default 0 [rad/m]): turn that odometry adds;
- *  - `~odometry_noise` (double, default 0): sd of each cycle's measured motion, as a part of it;
+ *  - `~odometry_noise` (double, default 0): standard deviation of each cycle's measured motion, as a part of it;
  *  - `~max_speed` (double, default 0.5 [m/s]), `~max_turn_rate` (double, default 1 [rad/s]), `~max_acceleration`
  *    (double, default 1 [m/s²]), `~max_turn_acceleration` (double, default 2 [rad/s²]).
  *
@@ -31,9 +33,10 @@ namespace
  * Publishes:
  *  - `odom` (nav_msgs/Odometry), `/tf` odom -> base_link, `/tf_static` base_link -> camera_optical_frame.
  */
-class NomadRobot
+class NomadInterface
 {
 public:
+  using Robot = NomadRobot;
   using Command = geometry_msgs::Twist;
   static constexpr RobotKind KIND = RobotKind::NOMAD;
 
@@ -52,57 +55,47 @@ public:
     }
   };
 
-  NomadRobot(const World& world, std::uint64_t seed, const Params& params, ros::NodeHandle& nh)
-    : nomad_(world, seeded(params, seed)), odometry_publisher_(nh.advertise<nav_msgs::Odometry>("odom", 50))
+  static std::unique_ptr<NomadRobot> makeRobot(const World& world, const Params& params, const ros::NodeHandle& /*nh*/)
   {
-    static_broadcaster_.sendTransform(toTransform(world.camera_on_base, BASE_FRAME, CAMERA_FRAME, ros::Time::now()));
+    return std::make_unique<NomadRobot>(world, params);
   }
 
-  bool command(const Command& twist)
+  NomadInterface(const NomadRobot& robot, ros::NodeHandle& nh)
+    : odometry_publisher_(nh.advertise<nav_msgs::Odometry>("odom", 50))
   {
-    return nomad_.command({ twist.linear.x, twist.linear.y, twist.angular.z });
+    static_broadcaster_.sendTransform(*robot.cameraMount(ros::Time::now()));
   }
-  void halt()
+
+  static std::optional<Robot::Twist> toTwist(const Command& message)
   {
-    nomad_.halt();
+    Robot::Twist twist = Robot::Twist::Zero();
+    twist(0) = message.linear.x;
+    twist(1) = message.linear.y;
+    twist(5) = message.angular.z;
+    return twist;
   }
-  void step(double dt)
+
+  void publish(NomadRobot& robot, const ros::Time& stamp)
   {
-    nomad_.step(dt);
+    const SensorMessages messages = robot.readSensors(stamp);
+    odometry_publisher_.publish(*messages.odometry);
+    broadcaster_.sendTransform(messages.transform);
   }
-  void setPose(const Eigen::Isometry3d& base)
+
+  static void diagnose(const NomadRobot& robot, diagnostic_updater::DiagnosticStatusWrapper& status)
   {
-    nomad_.setPose(base);
-  }
-  Eigen::Isometry3d cameraPose() const
-  {
-    return nomad_.cameraPose();
-  }
-  void publish(const ros::Time& stamp)
-  {
-    odometry_publisher_.publish(toOdometry(nomad_, stamp));
-    broadcaster_.sendTransform(toTransform(nomad_.odometry(), ODOM_FRAME, BASE_FRAME, stamp));
-  }
-  void diagnose(diagnostic_updater::DiagnosticStatusWrapper& status) const
-  {
-    if (nomad_.blockedBy().empty())
+    const std::string& obstacle = robot.nomad().blockedBy();
+    if (obstacle.empty())
     {
       status.summary(diagnostic_msgs::DiagnosticStatus::OK, "drives");
     }
     else
     {
-      status.summary(diagnostic_msgs::DiagnosticStatus::WARN, "stopped by " + nomad_.blockedBy());
+      status.summary(diagnostic_msgs::DiagnosticStatus::WARN, "stopped by " + obstacle);
     }
   }
 
 private:
-  static NomadParams seeded(NomadParams params, std::uint64_t seed)
-  {
-    params.seed = seed;
-    return params;
-  }
-
-  Nomad nomad_;
   ros::Publisher odometry_publisher_;
   tf2_ros::TransformBroadcaster broadcaster_;
   tf2_ros::StaticTransformBroadcaster static_broadcaster_;
@@ -113,5 +106,5 @@ private:
 
 int main(int argc, char** argv)
 {
-  return view_servo::runNode<view_servo::sim::SimulationNode<view_servo::sim::NomadRobot>>(argc, argv, "nomad_sim");
+  return view_servo::runNode<view_servo::sim::SimulationNode<view_servo::sim::NomadInterface>>(argc, argv, "nomad_sim");
 }

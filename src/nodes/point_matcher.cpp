@@ -46,11 +46,6 @@ public:
   static constexpr const char* TOPIC = "point_matches";
   static constexpr double RATE = 5.0;  // [Hz]
 
-  static Params readParams(ParameterReader& reader)
-  {
-    return readMatcherParams(reader);
-  }
-
   explicit PointMatching(const Params& params) : matcher_(params)
   {
   }
@@ -122,7 +117,7 @@ private:
  * Parameters, all private; config/point_matcher.yaml has them with their ranges:
  *  - `~view`, `~rate` (default 5.0 [Hz]), `~views_dir`, `~allow_paths`, `~image_patience`, `~image_transport`, `~queue_size`,
  *    `~max_image_age`: see StreamingMatcher;
- *  - those of the matcher, see matcherParameters().
+ *  - those of the matcher, see parameters(PointViewMatcherParams&).
  *
  * Subscribes:
  *  - `image_raw` (sensor_msgs/Image), `camera_info` (sensor_msgs/CameraInfo);

@@ -1,6 +1,6 @@
 // Copyright (c) 2026, the view_servo authors
 // SPDX-License-Identifier: BSD-3-Clause
-#include "sim/puma.h"
+#include "sim_ros/puma_robot.h"
 #include "sim_ros/simulation_node.h"
 
 #include <geometry_msgs/TwistStamped.h>
@@ -8,9 +8,10 @@
 #include <ros/publisher.h>
 #include <sensor_msgs/JointState.h>
 
-#include <cstdint>
 #include <fstream>
 #include <iterator>
+#include <memory>
+#include <optional>
 #include <stdexcept>
 #include <string>
 
@@ -36,12 +37,12 @@ std::string robotDescription(const ros::NodeHandle& nh)
 }
 
 /**
- * The arm, as a SimulationNode wants it. The URDF comes from `robot_description`, else from the package.
+ * What SimulationNode needs to know of the arm. The URDF comes from `robot_description`, else from the package.
  *
  * Parameters:
- *  - `~encoder_noise` (double, default 0 [rad]): sd of each reading;
- *  - `~hand_eye_translation_error` (double, default 0 [m]), `~hand_eye_rotation_error` (double, default 0 [rad]): of
- *    the true camera from where the URDF has it, in a seeded direction.
+ *  - `~encoder_noise` (double, default 0 [rad]): standard deviation of each reading;
+ *  - `~hand_eye_translation_error` (double, default 0 [m]), `~hand_eye_rotation_error` (double, default 0 [rad]): how
+ *    far the true camera is from where the URDF has it, in directions that `~seed` determines.
  *
  * Subscribes:
  *  - `cmd_vel` (geometry_msgs/TwistStamped): twist of the camera in its optical frame; another frame_id is refused.
@@ -49,9 +50,10 @@ std::string robotDescription(const ros::NodeHandle& nh)
  * Publishes:
  *  - `joint_states` (sensor_msgs/JointState); a robot_state_publisher makes tf of it.
  */
-class PumaRobot
+class PumaInterface
 {
 public:
+  using Robot = PumaRobot;
   using Command = geometry_msgs::TwistStamped;
   static constexpr RobotKind KIND = RobotKind::PUMA;
 
@@ -66,70 +68,53 @@ public:
     }
   };
 
-  PumaRobot(const World& world, std::uint64_t seed, const Params& params, ros::NodeHandle& nh)
-    : base_(world.robot_base),
-      puma_(robotDescription(nh), seeded(params, seed)),
-      joints_publisher_(nh.advertise<sensor_msgs::JointState>("joint_states", 50))
+  static std::unique_ptr<PumaRobot> makeRobot(const World& world, const Params& params, const ros::NodeHandle& nh)
+  {
+    return std::make_unique<PumaRobot>(world, robotDescription(nh), params);
+  }
+
+  PumaInterface(const PumaRobot& /*robot*/, ros::NodeHandle& nh)
+    : joints_publisher_(nh.advertise<sensor_msgs::JointState>("joint_states", 50))
   {
   }
 
-  bool command(const Command& message)
+  static std::optional<Robot::Twist> toTwist(const Command& message)
   {
     if (message.header.frame_id != CAMERA_FRAME)
     {
       ROS_ERROR_STREAM_THROTTLE(1.0,
                                 "twists must be in " << CAMERA_FRAME << ", not in '" << message.header.frame_id << "'");
-      return false;
+      return std::nullopt;
     }
     const auto& linear = message.twist.linear;
     const auto& angular = message.twist.angular;
-    Puma::Twist twist;
+    Robot::Twist twist;
     twist << linear.x, linear.y, linear.z, angular.x, angular.y, angular.z;
-    return puma_.command(twist);
+    return twist;
   }
-  void halt()
+
+  void publish(PumaRobot& robot, const ros::Time& stamp)
   {
-    puma_.halt();
-  }
-  void step(double dt)
-  {
-    puma_.step(dt);
-  }
-  void setPose(const Eigen::Isometry3d& camera)
-  {
-    if (!puma_.setCameraPose(base_.inverse() * camera))
+    joints_publisher_.publish(*robot.readSensors(stamp).joints);
+    if (isHindered(robot.puma()))
     {
-      throw std::invalid_argument("the arm cannot bring its camera there");
+      ROS_WARN_STREAM_THROTTLE(2.0, robot.puma().message());
     }
   }
-  Eigen::Isometry3d cameraPose() const
+
+  static void diagnose(const PumaRobot& robot, diagnostic_updater::DiagnosticStatusWrapper& status)
   {
-    return base_ * puma_.cameraPose();
-  }
-  void publish(const ros::Time& stamp)
-  {
-    joints_publisher_.publish(toJointState(puma_, puma_.measuredJoints(), stamp));
-    if (puma_.state() == Puma::State::AT_LIMIT || puma_.state() == Puma::State::NEAR_SINGULARITY)
-    {
-      ROS_WARN_STREAM_THROTTLE(2.0, puma_.message());
-    }
-  }
-  void diagnose(diagnostic_updater::DiagnosticStatusWrapper& status) const
-  {
-    const bool hindered = puma_.state() == Puma::State::AT_LIMIT || puma_.state() == Puma::State::NEAR_SINGULARITY;
+    const bool hindered = isHindered(robot.puma());
     status.summary(hindered ? diagnostic_msgs::DiagnosticStatus::WARN : diagnostic_msgs::DiagnosticStatus::OK,
-                   hindered ? puma_.message() : "follows");
+                   hindered ? robot.puma().message() : "follows");
   }
 
 private:
-  static PumaParams seeded(PumaParams params, std::uint64_t seed)
+  static bool isHindered(const Puma& puma)
   {
-    params.seed = seed;
-    return params;
+    return puma.state() == Puma::State::AT_LIMIT || puma.state() == Puma::State::NEAR_SINGULARITY;
   }
 
-  Eigen::Isometry3d base_;
-  Puma puma_;
   ros::Publisher joints_publisher_;
 };
 
@@ -138,5 +123,5 @@ private:
 
 int main(int argc, char** argv)
 {
-  return view_servo::runNode<view_servo::sim::SimulationNode<view_servo::sim::PumaRobot>>(argc, argv, "puma_sim");
+  return view_servo::runNode<view_servo::sim::SimulationNode<view_servo::sim::PumaInterface>>(argc, argv, "puma_sim");
 }

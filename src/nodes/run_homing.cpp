@@ -2,7 +2,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "sim_ros/simulated_run.h"
 #include "view_servo/HomeToViewAction.h"
-#include "view_servo/geometry/planar_motion.h"
+#include "view_servo/geometry/planar_pose.h"
 
 #include <cmath>
 #include <cstdio>

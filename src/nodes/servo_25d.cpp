@@ -8,6 +8,7 @@
 #include "view_servo/ros/arm_conversions.h"
 #include "view_servo/ros/conversions.h"
 #include "view_servo/ros/driver_node.h"
+#include "view_servo/ros/image_source.h"
 #include "view_servo/ros/rectifier.h"
 #include "view_servo/ros/view_answer.h"
 #include "view_servo/views/view_store.h"
@@ -58,15 +59,8 @@ struct ServoTask
 }  // namespace
 
 /**
- * Brings the camera in an arm's hand to where a view was stored, by the homographies of a plane (2.5D servoing). Parameters,
- * all private; config/servo_25d.yaml has them with their ranges:
- *  - those of every driver, see DriverNode;
- *  - `~views_dir` (string): as in view_store;
- *  - `~acquire_timeout` (double, default 15 [s]): until the view is found at first;
- *  - `~homography_timeout` (double, default 0.25 [s]): without a homography for so long, by a steady clock, the camera stands
- *    still until there is one again; `~max_homography_age` (double, default 0.5 [s]): older ones do not count;
- *  - `~joint_margin` (double, default 0.02 [rad] or [m]), `~joint_timeout` (double, default 1 [s]): see below;
- *  - those of servoing and of the camera's limits, see servoParameters().
+ * Brings the camera in an arm's hand to where a view was stored, by the homographies of a plane (2.5D servoing). Private
+ * parameters: see ServoDriverParams.
  *
  * Subscribes:
  *  - `homography` (view_servo/Homography), of homography_tracker, which follows `~wanted_view`;
@@ -98,7 +92,7 @@ public:
               params.joint_timeout),
       homographies_(context.addInput("homography", context.quoted("homography"), params.homography_timeout)),
       joint_states_(context.addInput("joint states", context.quoted("joint_states"), params.joint_timeout)),
-      store_(params.views_dir),
+      store_(viewsDir(params.views_dir)),
       answer_("homographies", context.resolved("homography"))
   {
     ros::NodeHandle& nh = context.nodeHandle();
@@ -124,11 +118,11 @@ public:
     }
     const StoredView stored = store_.load(goal.view);
     context_.locked([&] { answer_.want(stored.name, context_.goalId()); });
-    context_.wantView(stored.name);
+    context_.requestView(stored.name);
     // Only one that has come since: the camera may be another than it was.
     context_.locked([this] { info_.reset(); });
     sensor_msgs::CameraInfo::ConstPtr info;
-    context_.require([&] {
+    context_.waitFor([&] {
       info = context_.locked([this] { return info_; });
       return info ? "" : "no camera_info has come on " + context_.quoted("camera_info");
     });
@@ -151,7 +145,7 @@ public:
     auto task = std::make_unique<Task>(
         rectifier, ServoTarget{ rectifier.k(), { size.width, size.height }, rectifier.point(middle) }, params);
     task->view = stored.name;
-    context_.require([this] { return context_.locked([this] { return missingAnswer({ &answer_ }); }); });
+    context_.waitFor([this] { return context_.locked([this] { return missingAnswer({ &answer_ }); }); });
     return task;
   }
 
@@ -213,7 +207,7 @@ public:
     task_->servo.sent(time, twist);
   }
 
-  void stands(double time, const std::string& why)
+  void onMissingInput(double time, const std::string& why)
   {
     joints_.rest();
     if (task_->found)
@@ -222,7 +216,7 @@ public:
     }
   }
 
-  bool heard() const
+  bool hasListener() const
   {
     return command_publisher_.getNumSubscribers() > 0;
   }
@@ -238,7 +232,7 @@ public:
     command_publisher_.publish(message);
   }
 
-  std::optional<double> answered()
+  std::optional<double> takeLatency()
   {
     if (!task_ || !std::exchange(task_->unanswered, false))
     {
@@ -295,7 +289,7 @@ private:
   void onCameraInfo(const sensor_msgs::CameraInfo::ConstPtr& message)
   {
     info_ = message;
-    if (task_ && !task_->rectifier.isOf(*message))
+    if (task_ && !task_->rectifier.hasCalibration(*message))
     {
       context_.abort(isCalibrated(*message) ? "the camera's calibration has changed" : uncalibrated());
     }

@@ -9,6 +9,7 @@
 #include "view_servo/ros/conversions.h"
 #include "view_servo/ros/image_source.h"
 #include "view_servo/ros/node_base.h"
+#include "view_servo/ros/node_params.h"
 #include "view_servo/ros/parameters.h"
 #include "view_servo/ros/transform_source.h"
 
@@ -21,36 +22,10 @@
 
 namespace view_servo
 {
-namespace
-{
-struct ViewStoreNodeParams
-{
-  CameraInputParams camera;
-  ImageSourceParams sources;
-  std::string fixed_frame = "odom";
-
-  /** @throws std::invalid_argument listing all faults. */
-  static ViewStoreNodeParams read(const ros::NodeHandle& private_nh)
-  {
-    ViewStoreNodeParams params;
-    ParameterReader reader(private_nh);
-    params.camera = CameraInputParams::read(reader);
-    params.sources = ImageSourceParams::read(reader);
-    reader.read("fixed_frame", params.fixed_frame);
-    reader.finish();
-    return params;
-  }
-};
-
-}  // namespace
-
 /**
  * Keeps stored views on disk: an image, with the camera's calibration, the region of interest, stamp, frame and pose.
  *
- * Parameters, all private:
- *  - `~fixed_frame` (string, default "odom"): the camera's pose is stored in this frame, where tf knows it; "" = never;
- *  - `~views_dir`, `~allow_paths`, `~image_patience`: see ImageSourceReader;
- *  - `~image_transport`, `~queue_size`, `~max_image_age`: see CameraInput.
+ * Its private parameters: see ViewStoreNodeParams.
  *
  * Subscribes:
  *  - `image_raw` (sensor_msgs/Image), `camera_info` (sensor_msgs/CameraInfo), `/tf`, `/tf_static`.
@@ -71,7 +46,7 @@ class ViewStoreNode : private NodeBase
 public:
   ViewStoreNode(const ros::NodeHandle& nh, const ros::NodeHandle& private_nh)
     : NodeBase(nh, private_nh),
-      params_(ViewStoreNodeParams::read(private_nh)),
+      params_(readParams<ViewStoreNodeParams>(private_nh)),
       camera_(nh, params_.camera),
       sources_(params_.sources, camera_),
       store_(sources_.store())
@@ -87,7 +62,7 @@ public:
 private:
   void save(const SaveView::Request& request, SaveView::Response& response)
   {
-    const SourcedImage source = sources_.read(request.source, "source");
+    const SourcedImage source = sources_.read(kindOf(request.source, "source"), request.source, "source");
     StoredView view;
     view.name = request.name;
     view.image = source.grey;

@@ -2,8 +2,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "view_servo/robust/multi_hypothesis.h"
 
-#include "view_servo/parameters/faults.h"
 #include "view_servo/matching/assignment.h"
+#include "view_servo/parameters/faults.h"
 
 #include <algorithm>
 #include <cmath>
@@ -316,13 +316,19 @@ MultiHypothesisResult<typename Fit::Estimator::Model> estimate(const Association
 
 }  // namespace
 
+std::vector<Parameter> parameters(MultiHypothesisParams& params)
+{
+  return {
+    integer("hypotheses_per_point", params.entries_per_row, "", ">= 1",
+            "strongest associations of a reference point kept for several hypotheses"),
+    real("association_weight", params.association_weight, "px", ">= 0",
+         "lambda: what the strongest association counts beside the fit"),
+  };
+}
+
 std::vector<std::string> MultiHypothesisParams::validate() const
 {
-  Faults faults;
-  faults.require(entries_per_row >= 1, "hypotheses_per_point must be at least 1");
-  faults.require(association_weight >= 0.0 && std::isfinite(association_weight),
-                 "association_weight must be at least 0 px and finite");
-  return faults.list();
+  return faultsOf(*this);
 }
 
 MultiHypothesisResult<FundamentalEstimator::Model> estimateFundamental(const AssociationMatrix& association,

@@ -9,23 +9,26 @@
 
 namespace view_servo
 {
+std::vector<Parameter> parameters(RansacParams& params)
+{
+  return {
+    real("inlier_threshold", params.inlier_threshold, "px", "> 0", "largest error of an inlier"),
+    real("ransac_confidence", params.confidence, "", "(0, 1)", "wanted probability of an outlier-free sample"),
+    integer("ransac_min_iterations", params.min_iterations, "", ">= 0", "samples drawn at least"),
+    integer("ransac_max_iterations", params.max_iterations, "", ">= 1", "samples drawn at most"),
+    integer("ransac_max_rejected", params.max_rejected, "", ">= 0", "samples that a cheap test may refuse"),
+    integer("local_optimizations", params.local_optimizations, "", ">= 0", "refits of a new best model, 0 = off"),
+    boolean("improvement_stage", params.improvement_stage, "exchange each datum of the best sample in turn"),
+  };
+}
+
 std::vector<std::string> RansacParams::validate() const
 {
-  std::vector<std::string> faults;
-  const auto require = [&faults](bool condition, const char* fault) {
-    if (!condition)
-    {
-      faults.emplace_back(fault);
-    }
-  };
-  require(inlier_threshold > 0.0 && std::isfinite(inlier_threshold), "inlier_threshold must be positive and finite");
-  require(confidence > 0.0 && confidence < 1.0, "ransac_confidence must be between 0 and 1, both excluded");
-  require(min_iterations >= 0, "ransac_min_iterations must not be negative");
-  require(max_iterations >= 1, "ransac_max_iterations must be at least 1");
-  require(max_rejected >= 0, "ransac_max_rejected must not be negative");
-  require(local_optimizations >= 0, "local_optimizations must not be negative");
-  require(sampling == Sampling::UNIFORM || sampling == Sampling::PROGRESSIVE,
-          "sampling must be UNIFORM or PROGRESSIVE");
+  std::vector<std::string> faults = faultsOf(*this);
+  if (sampling != Sampling::UNIFORM && sampling != Sampling::PROGRESSIVE)
+  {
+    faults.emplace_back("sampling must be UNIFORM or PROGRESSIVE");
+  }
   return faults;
 }
 

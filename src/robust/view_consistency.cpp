@@ -113,22 +113,18 @@ double viewConstraint(const std::array<Correspondence, 5>& five)
   return std::min(std::abs(rows[0].x() * rows[1].y() - rows[0].y() * rows[1].x()), 1.0);
 }
 
+std::vector<Parameter> parameters(ViewConsistencyParams& params)
+{
+  return {
+    real("consistency_threshold", params.threshold, "", "(0, 1]", "violation of a consistent group"),
+    real("consistency_increments", params.mean_increments, "", "> 0", "counts a candidate, on average"),
+    integer("consistency_max_groups", params.max_groups, "", ">= 1", "groups of five drawn at most"),
+  };
+}
+
 std::vector<std::string> ViewConsistencyParams::validate() const
 {
-  std::vector<std::string> faults;
-  if (!(threshold > 0.0 && threshold <= 1.0))
-  {
-    faults.emplace_back("threshold must be positive and at most 1");
-  }
-  if (!(mean_increments > 0.0 && std::isfinite(mean_increments)))
-  {
-    faults.emplace_back("mean_increments must be positive and finite");
-  }
-  if (max_groups < 1)
-  {
-    faults.emplace_back("max_groups must be at least 1");
-  }
-  return faults;
+  return faultsOf(*this);
 }
 
 std::vector<int> viewConsistentCandidates(const Correspondences& candidates, const ViewConsistencyParams& params,

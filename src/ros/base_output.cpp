@@ -36,7 +36,7 @@ void BaseOutput::publish(const HomingReport& report) const
   }
 }
 
-bool BaseOutput::heard() const
+bool BaseOutput::hasListener() const
 {
   return commands_.getNumSubscribers() + stamped_commands_.getNumSubscribers() > 0;
 }

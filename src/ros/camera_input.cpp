@@ -2,10 +2,10 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "view_servo/ros/camera_input.h"
 
+#include "view_servo/images/image_io.h"
 #include "view_servo/ros/conversions.h"
 #include "view_servo/ros/node_base.h"
 #include "view_servo/ros/readiness.h"
-#include "view_servo/images/image_io.h"
 
 #include <ros/console.h>
 #include <ros/time.h>
@@ -24,15 +24,16 @@ constexpr double ERROR_PERIOD = 10.0;  // [s]
 
 }  // namespace
 
-CameraInputParams CameraInputParams::read(ParameterReader& reader)
+std::vector<Parameter> parameters(CameraInputParams& params)
 {
-  CameraInputParams params;
-  reader.expect("image_transport");
-  reader.read("queue_size", params.queue_size);
-  reader.require(params.queue_size >= 1, "~queue_size must be at least 1");
-  reader.read("max_image_age", params.max_image_age);
-  reader.require(params.max_image_age > 0.0, "~max_image_age must be positive [s]");
-  return params;
+  return {
+    text("image_transport", params.image_transport,
+         "how camera images travel: raw, or another image transport that is installed"),
+    integer("queue_size", params.queue_size, "", ">= 1",
+            "images that wait for the camera_info of their stamp, and the other way round"),
+    real("max_image_age", params.max_image_age, "s", "> 0",
+         "an image older than this is not the camera's present view"),
+  };
 }
 
 CameraInput::CameraInput(const ros::NodeHandle& nh, const CameraInputParams& params, Callback on_frame,
@@ -142,10 +143,10 @@ void CameraInput::diagnose(diagnostic_updater::DiagnosticStatusWrapper& status)
 
 void CameraInput::frameCallback(const sensor_msgs::ImageConstPtr& image, const sensor_msgs::CameraInfoConstPtr& info)
 {
-  guarded("an image on '" + imageTopic() + "'", [&] { take(image, info); });
+  guarded("an image on '" + imageTopic() + "'", [&] { onPair(image, info); });
 }
 
-void CameraInput::take(const sensor_msgs::ImageConstPtr& image, const sensor_msgs::CameraInfoConstPtr& info)
+void CameraInput::onPair(const sensor_msgs::ImageConstPtr& image, const sensor_msgs::CameraInfoConstPtr& info)
 {
   const std::string fault = faultOf(*image, *info);
   {

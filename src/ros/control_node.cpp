@@ -28,11 +28,6 @@ void shutdownCallback(XmlRpc::XmlRpcValue& /*parameters*/, XmlRpc::XmlRpcValue& 
 
 }  // namespace
 
-CommandGate::CommandGate(ParameterReader& reader)
-{
-  reader.read("dry_run", dry_run_);
-}
-
 std_srvs::SetBool::Response CommandGate::set(bool enabled)
 {
   enabled_ = enabled;

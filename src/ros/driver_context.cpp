@@ -57,8 +57,8 @@ std::string stampsApart(const DriverInput& odometry, const DriverInput& images)
          (ahead > 0.0 ? " after" : " before") + " the images on " + images.topics() + ": their clocks are apart";
 }
 
-DriverContext::DriverContext(const ros::NodeHandle& nh, const ros::NodeHandle& private_nh, ParameterReader& reader)
-  : NodeBase(nh, private_nh), gate_(reader)
+DriverContext::DriverContext(const ros::NodeHandle& nh, const ros::NodeHandle& private_nh, bool dry_run)
+  : NodeBase(nh, private_nh), gate_(dry_run)
 {
   wanted_view_publisher_ = private_nh_.advertise<WantedView>("wanted_view", 1, true);
 }
@@ -69,7 +69,7 @@ DriverInput& DriverContext::addInput(const std::string& what, const std::string&
   return *inputs_.back();
 }
 
-void DriverContext::require(const std::function<std::string()>& missing)
+void DriverContext::waitFor(const std::function<std::string()>& missing)
 {
   const auto ended = [this] {
     return locked([this] { return !preparing(); });
@@ -90,7 +90,7 @@ void DriverContext::require(const std::function<std::string()>& missing)
   }
 }
 
-void DriverContext::wantView(const std::string& view)
+void DriverContext::requestView(const std::string& view)
 {
   locked([&] {
     if (preparing())

@@ -2,66 +2,95 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "view_servo/ros/driver_params.h"
 
-#include "view_servo/control/homing_parameters.h"
-#include "view_servo/control/servo_parameters.h"
+#include "view_servo/parameters/faults.h"
 #include "view_servo/ros/image_source.h"
-#include "view_servo/views/view_store.h"
 
 namespace view_servo
 {
-void DriverParams::read(ParameterReader& reader)
+namespace
 {
-  reader.read("timeout", timeout);
-  reader.require(timeout > 0.0, "~timeout must be more than 0 s");
-  reader.read("control_rate", control_rate);
-  reader.require(control_rate >= 10.0 && control_rate <= 1000.0, "~control_rate must lie in [10, 1000] Hz");
-  reader.read("start_patience", start_patience);
-  reader.require(start_patience > 0.0, "~start_patience must be more than 0 s");
+/** The parameters of the driver of a base that none of its parts has. */
+std::vector<Parameter> rowsOfHomingDriver(HomingDriverParams& params)
+{
+  return {
+    viewParameter(
+        params.view,
+        "stored view whose direction is estimated whenever no goal is active, and which a goal without a name means; "
+        "empty: none"),
+    viewsDirParameter(params.views_dir),
+    text("base_frame", params.base_frame,
+         "the base's frame: that of commands, and the child frame of odometry; tf must know where the camera is in it"),
+    real("image_timeout", params.image_timeout, "s", "> 0", "the base stands when no image has come for so long"),
+    real("odometry_timeout", params.odometry_timeout, "s", "> 0",
+         "the base stands when no odometry has come for so long"),
+    real("match_timeout", params.match_timeout, "s", "> 0",
+         "the base stands when neither kind of matches has come for so long, though it needs them"),
+  };
 }
 
-HomingDriverParams HomingDriverParams::read(ParameterReader& reader)
+}  // namespace
+
+std::vector<Parameter> parameters(DriverParams& params)
 {
-  HomingDriverParams params;
-  params.node.timeout = 120.0;
-  params.node.read(reader);
-  params.camera = CameraInputParams::read(reader);
-  params.views_dir = readViewsDir(reader);
-  reader.read("view", params.view);
-  reader.require(params.view.empty() || isValidViewName(params.view),
-                 "~view: '" + params.view + "' is not a view's name");
-  reader.read("base_frame", params.base_frame);
-  reader.require(!params.base_frame.empty(), "~base_frame must not be empty");
-  reader.read("image_timeout", params.image_timeout);
-  reader.read("odometry_timeout", params.odometry_timeout);
-  reader.read("match_timeout", params.match_timeout);
-  reader.require(params.image_timeout > 0.0 && params.odometry_timeout > 0.0 && params.match_timeout > 0.0,
-                 "~image_timeout, ~odometry_timeout and ~match_timeout must be more than 0 s");
-  reader.read(homingParameters(params.homing, params.limits));
-  reader.addFaults(params.homing.validate());
-  reader.addFaults(params.limits.validate());
-  params.lost_timeout = params.homing.lost_timeout;
-  return params;
+  return {
+    boolean("dry_run", params.dry_run, "do everything but move: commands are zero"),
+    real("timeout", params.timeout, "s", "> 0", "time limit of a goal that brings none"),
+    real("control_rate", params.control_rate, "Hz", "[10, 1000]", "rate of commands"),
+    real("start_patience", params.start_patience, "s", "> 0",
+         "how long a goal waits for what it needs before it begins"),
+  };
 }
 
-ServoDriverParams ServoDriverParams::read(ParameterReader& reader)
+std::vector<Parameter> parameters(HomingDriverParams& params)
 {
-  ServoDriverParams params;
-  params.node.read(reader);
-  params.views_dir = readViewsDir(reader);
-  reader.read("acquire_timeout", params.acquire_timeout);
-  reader.read("homography_timeout", params.homography_timeout);
-  reader.read("max_homography_age", params.max_homography_age);
-  reader.read("joint_timeout", params.joint_timeout);
-  reader.require(params.acquire_timeout > 0.0 && params.homography_timeout > 0.0 && params.max_homography_age > 0.0 &&
-                     params.joint_timeout > 0.0,
-                 "~acquire_timeout, ~homography_timeout, ~max_homography_age and ~joint_timeout must be more than 0 s");
-  reader.read("joint_margin", params.joint_margin);
-  reader.require(params.joint_margin >= 0.0, "~joint_margin must not be negative");
-  reader.read(servoParameters(params.servo, params.limits));
-  reader.addFaults(params.servo.validate());
-  reader.addFaults(params.limits.validate());
-  params.lost_timeout = params.servo.lost_timeout;
-  return params;
+  return joined({
+      rowsOfHomingDriver(params),
+      parameters(params.node),
+      parameters(params.camera),
+      parameters(params.homing),
+      parameters(params.limits),
+  });
+}
+
+std::vector<std::string> HomingDriverParams::validate() const
+{
+  HomingDriverParams copy = *this;
+  Faults faults;
+  faults.add(viewFaults(view));
+  faults.require(!base_frame.empty(), "base_frame must not be empty");
+  faults.add(faultsOf(rowsOfHomingDriver(copy)));
+  faults.add(faultsOf(node));
+  faults.add(faultsOf(camera));
+  faults.add(homing.validate());
+  faults.add(limits.validate());
+  return faults.list();
+}
+
+std::vector<Parameter> parameters(ServoDriverParams& params)
+{
+  return joined({
+      {
+          viewsDirParameter(params.views_dir),
+          real("acquire_timeout", params.acquire_timeout, "s", "> 0",
+               "a goal whose view is not found at all ends after this time"),
+          real("homography_timeout", params.homography_timeout, "s", "> 0",
+               "the camera stands when no homography has come for so long"),
+          real("max_homography_age", params.max_homography_age, "s", "> 0",
+               "a homography of an image older than this counts as none"),
+          real("joint_margin", params.joint_margin, "rad or m", ">= 0",
+               "a joint nearer to its limit of robot_description than this, and not on its way back, ends a goal"),
+          real("joint_timeout", params.joint_timeout, "s", "> 0",
+               "the camera stands when joint_states, once they have come, cease for so long"),
+      },
+      parameters(params.node),
+      parameters(params.servo),
+      parameters(params.limits),
+  });
+}
+
+std::vector<std::string> ServoDriverParams::validate() const
+{
+  return faultsOf(*this);
 }
 
 }  // namespace view_servo

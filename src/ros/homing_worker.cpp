@@ -17,7 +17,7 @@ HomingWorker::HomingWorker(std::string image_topic, std::function<void(const Hom
 {
 }
 
-void HomingWorker::start(const std::shared_ptr<HomingTask>& task)
+void HomingWorker::setTask(const std::shared_ptr<HomingTask>& task)
 {
   worker_.put([&](Inbox& inbox) {
     inbox = Inbox();

@@ -2,8 +2,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "view_servo/ros/image_source.h"
 
-#include "view_servo/ros/conversions.h"
 #include "view_servo/images/image_io.h"
+#include "view_servo/ros/conversions.h"
 
 #include <cstdlib>
 #include <utility>
@@ -62,32 +62,54 @@ void requireSameSize(const std::string& view, const cv::Size& size, const sensor
   }
 }
 
-std::filesystem::path readViewsDir(ParameterReader& reader)
+Parameter viewsDirParameter(std::filesystem::path& views_dir)
 {
-  std::string views_dir;
-  reader.read("views_dir", views_dir);
-  return views_dir.empty() ? defaultViewsDir() : std::filesystem::path(views_dir);
+  return path("views_dir", views_dir,
+              "directory of the stored views; empty: $ROS_HOME/view_servo/views, where ROS_HOME is ~/.ros unless set");
 }
 
-ImageSourceParams ImageSourceParams::read(ParameterReader& reader)
+Parameter viewParameter(std::string& view, std::string description)
 {
-  ImageSourceParams params;
-  params.views_dir = readViewsDir(reader);
-  reader.read("allow_paths", params.allow_paths);
-  reader.read("image_patience", params.image_patience);
-  reader.require(params.image_patience >= 0.0, "~image_patience must not be negative [s]");
-  return params;
+  return text("view", view, std::move(description));
+}
+
+std::vector<std::string> viewFaults(const std::string& view)
+{
+  if (view.empty() || isValidViewName(view))
+  {
+    return {};
+  }
+  return { "view: '" + view + "' is not a view's name" };
+}
+
+std::filesystem::path viewsDir(const std::filesystem::path& views_dir)
+{
+  return views_dir.empty() ? defaultViewsDir() : views_dir;
+}
+
+std::vector<Parameter> parameters(ImageSourceParams& params)
+{
+  return {
+    viewsDirParameter(params.views_dir),
+    boolean("allow_paths", params.allow_paths,
+            "whether requests may name image files, which are read with the rights of the node"),
+    real("image_patience", params.image_patience, "s", ">= 0",
+         "how long a request for the camera's image waits when none has come yet"),
+  };
 }
 
 ImageSourceReader::ImageSourceReader(const ImageSourceParams& params, const CameraInput& camera)
-  : allow_paths_(params.allow_paths), image_patience_(params.image_patience), store_(params.views_dir), camera_(camera)
+  : allow_paths_(params.allow_paths),
+    image_patience_(params.image_patience),
+    store_(viewsDir(params.views_dir)),
+    camera_(camera)
 {
 }
 
-SourcedImage ImageSourceReader::read(const ImageSource& source, const std::string& name) const
+SourcedImage ImageSourceReader::read(SourceKind kind, const ImageSource& source, const std::string& name) const
 {
   SourcedImage result;
-  switch (kindOf(source, name))
+  switch (kind)
   {
     case SourceKind::CAMERA:
     {

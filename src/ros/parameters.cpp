@@ -15,9 +15,13 @@ namespace view_servo
 {
 namespace
 {
-/** Empty for values that are not scalars. */
+/** Empty for values that are not scalars, and for others than strings where one is wanted. */
 std::optional<std::string> toText(XmlRpc::XmlRpcValue value, const std::string& type)
 {
+  if (type == "string" && value.getType() != XmlRpc::XmlRpcValue::TypeString)
+  {
+    return std::nullopt;
+  }
   switch (value.getType())
   {
     case XmlRpc::XmlRpcValue::TypeBoolean:
@@ -60,52 +64,10 @@ std::string namespaceOf(const std::string& name)
   return slash == std::string::npos ? "" : name.substr(0, slash);
 }
 
-template <typename Params>
-Params readTable(ParameterReader& reader, const std::string& ns)
-{
-  Params params;
-  reader.read(matcherParameters(params), ns);
-  reader.addFaults(params.validate());
-  return params;
-}
-
 }  // namespace
 
 ParameterReader::ParameterReader(const ros::NodeHandle& private_nh) : private_nh_(private_nh)
 {
-}
-
-template <typename T>
-void ParameterReader::readAs(const std::string& name, const std::string& type, T& value)
-{
-  expect(name);
-  if (private_nh_.hasParam(name) && !private_nh_.getParam(name, value))
-  {
-    faults_.push_back("~" + name + " must be " + type);
-  }
-  std::ostringstream text;
-  text << std::boolalpha << name << "=" << value;
-  values_.push_back(text.str());
-}
-
-void ParameterReader::read(const std::string& name, bool& value)
-{
-  readAs(name, "true or false", value);
-}
-
-void ParameterReader::read(const std::string& name, int& value)
-{
-  readAs(name, "a whole number", value);
-}
-
-void ParameterReader::read(const std::string& name, double& value)
-{
-  readAs(name, "a number", value);
-}
-
-void ParameterReader::read(const std::string& name, std::string& value)
-{
-  readAs(name, "a string; quote it where it looks like a number", value);
 }
 
 void ParameterReader::read(const std::vector<Parameter>& table)
@@ -125,18 +87,13 @@ void ParameterReader::read(const std::vector<Parameter>& table, const std::strin
       const std::optional<std::string> text = toText(value, parameter.type);
       if (!text || !parameter.set(*text))
       {
-        faults_.push_back("~" + name + " must be " + parameter.type + (text ? ", not '" + *text + "'" : ""));
+        const bool other = parameter.type == "string";  // what is no string in yaml, though its text would do
+        faults_.push_back("~" + name + " must be " +
+                          (other ? "a string; quote it where it looks like a number" : parameter.type) +
+                          (text ? ", not '" + *text + "'" : ""));
       }
     }
     values_.push_back(name + "=" + parameter.get());
-  }
-}
-
-void ParameterReader::require(bool condition, const std::string& fault)
-{
-  if (!condition)
-  {
-    faults_.push_back(fault);
   }
 }
 
@@ -147,7 +104,7 @@ void ParameterReader::addFaults(const std::vector<std::string>& faults)
 
 void ParameterReader::expect(const std::string& name)
 {
-  known_.push_back({ name, "", "", nullptr, nullptr });
+  known_.push_back({ name, "", "", "", "", nullptr, nullptr, nullptr });
 }
 
 void ParameterReader::finish() const
@@ -184,16 +141,6 @@ void ParameterReader::warnOfUnknown() const
                           << nearestName(known_, name) << "?)");
     }
   }
-}
-
-PointViewMatcherParams readMatcherParams(ParameterReader& reader, const std::string& ns)
-{
-  return readTable<PointViewMatcherParams>(reader, ns);
-}
-
-LineMatcherParams readLineMatcherParams(ParameterReader& reader)
-{
-  return readTable<LineMatcherParams>(reader, "");
 }
 
 }  // namespace view_servo

@@ -34,13 +34,13 @@ void PlaneSession::reset()
   path_.clear();
 }
 
-bool PlaneSession::isOf(const sensor_msgs::CameraInfo& info)
+bool PlaneSession::checkCalibration(const sensor_msgs::CameraInfo& info)
 {
-  calibration_changed_ = calibration_changed_ || !rectifier_.isOf(info);
+  calibration_changed_ = calibration_changed_ || !rectifier_.hasCalibration(info);
   return !calibration_changed_;
 }
 
-std::string PlaneSession::advance(const ros::Time& stamp)
+std::string PlaneSession::checkTime(const ros::Time& stamp)
 {
   std::string jump = timeJump(last_stamp_, stamp, "images");
   if (!jump.empty())

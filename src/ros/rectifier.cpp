@@ -35,7 +35,7 @@ Rectifier::Rectifier(const sensor_msgs::CameraInfo& info) : info_(info)
   }
 }
 
-bool Rectifier::isOf(const sensor_msgs::CameraInfo& info) const
+bool Rectifier::hasCalibration(const sensor_msgs::CameraInfo& info) const
 {
   return sameCalibration(info_, info);
 }

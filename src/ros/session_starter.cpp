@@ -2,11 +2,11 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "view_servo/ros/session_starter.h"
 
+#include "view_servo/images/image_io.h"
 #include "view_servo/ros/conversions.h"
 #include "view_servo/ros/image_source.h"
 #include "view_servo/ros/node_base.h"
 #include "view_servo/tracking/plane_tracker_parameters.h"
-#include "view_servo/images/image_io.h"
 #include "view_servo/views/view_store.h"
 
 #include <ros/console.h>
@@ -17,21 +17,26 @@
 
 namespace view_servo
 {
-SessionStarterParams SessionStarterParams::read(ParameterReader& reader)
+std::vector<Parameter> parameters(SessionStarterParams& params)
 {
-  SessionStarterParams params;
-  params.views_dir = readViewsDir(reader);
-  reader.read("odom_frame", params.odom_frame);
-  reader.read("tf_patience", params.tf_patience);
-  reader.require(params.tf_patience >= 0.0, "~tf_patience must not be negative [s]");
-  reader.read(planeTrackerParameters(params.tracker));
-  reader.addFaults(params.tracker.validate());
-  return params;
+  return joined({
+      {
+          viewsDirParameter(params.views_dir),
+          text("odom_frame", params.odom_frame,
+               "frame that stands still while the camera moves, an arm's base or odometry's, in which tf must know the "
+               "camera's optical frame; it predicts where the plane is in the next image, and gives the plane's "
+               "distance; "
+               "empty: do without"),
+          real("tf_patience", params.tf_patience, "s", ">= 0",
+               "how long an image waits for tf to know where its camera was; then it is followed without"),
+      },
+      parameters(params.tracker),
+  });
 }
 
 SessionStarter::SessionStarter(const SessionStarterParams& params, const FeatureParams& features,
                                const CameraInput& camera)
-  : params_(params), camera_(camera), views_(ViewStore(params.views_dir), features)
+  : params_(params), camera_(camera), views_(ViewStore(viewsDir(params.views_dir)), features)
 {
 }
 

@@ -2,22 +2,30 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "view_servo/ros/streaming_matcher.h"
 
-#include "view_servo/views/view_store.h"
+#include "view_servo/parameters/faults.h"
 
 namespace view_servo
 {
-StreamingMatcherParams StreamingMatcherParams::read(ParameterReader& reader, double default_rate)
+std::vector<Parameter> parameters(StreamingMatcherParams& params)
 {
-  StreamingMatcherParams params;
-  params.camera = CameraInputParams::read(reader);
-  params.sources = ImageSourceParams::read(reader);
-  reader.read("view", params.view);
-  reader.require(params.view.empty() || isValidViewName(params.view),
-                 "~view: '" + params.view + "' is not a view's name");
-  params.rate = default_rate;
-  reader.read("rate", params.rate);
-  reader.require(params.rate >= 0.001, "~rate must be at least 0.001 [Hz]");
-  return params;
+  return joined({
+      {
+          viewParameter(params.view,
+                        "stored view that camera images are matched with; empty: none, until one is named"),
+          real("rate", params.rate, "Hz", ">= 0.001",
+               "camera images are matched at most this often, always the newest"),
+      },
+      parameters(params.sources),
+      parameters(params.camera),
+  });
+}
+
+std::vector<std::string> StreamingMatcherParams::validate() const
+{
+  Faults faults;
+  faults.add(faultsOf(*this));
+  faults.add(viewFaults(view));
+  return faults.list();
 }
 
 }  // namespace view_servo

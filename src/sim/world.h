@@ -9,7 +9,6 @@
 #include <opencv2/core/mat.hpp>
 #include <opencv2/core/types.hpp>
 
-#include <filesystem>
 #include <map>
 #include <string>
 #include <vector>
@@ -17,38 +16,41 @@
 namespace view_servo::sim
 {
 /** @file
- * What a simulated robot lives in, read from YAML (`config/worlds/`, whose README says what a file may hold). Frames
- * follow REP 103: the world's z axis points up; optical frames have x right, y down, z forward. Lengths in metres.
+ * The world that a simulated robot moves in and its camera sees; world_reader.h reads it from a file. Frames follow REP
+ * 103: the world's z axis points up; optical frames have x right, y down, z forward. Lengths are in metres.
  */
 
-/** A flat rectangle in the x-y plane of its own frame, its middle in the origin; the picture is upright seen from +z. */
+/**
+ * A flat rectangle with a picture on it. In its own frame it lies in the x-y plane around the origin, and the picture
+ * is upright when it is seen from +z.
+ */
 struct Surface
 {
   std::string name;
-  std::string group;        ///< shown only when asked for; empty: always
+  std::string group;        ///< is drawn only when this group is asked for; empty: always
   Eigen::Isometry3d pose;   ///< world from surface
   Eigen::Vector2d size;     ///< along its x and y
   int texture;              ///< index in World::textures
   Eigen::Vector2d repeat;   ///< how often the picture fits along x and y
-  double brightness = 1.0;  ///< of the picture
+  double brightness = 1.0;  ///< factor of the picture's grey levels
 };
 
-/** Where the base cannot be: the outline of a thing on the floor, a convex polygon, counter-clockwise. */
+/** A thing on the floor where the base cannot be: its outline is a convex polygon, counter-clockwise, in the world. */
 struct Obstacle
 {
   std::string name;
   std::vector<Eigen::Vector2d> outline;
 };
 
-/** How a camera turns what it sees into numbers, besides its calibration. */
+/** How good the images of a camera are. */
 struct ImageQuality
 {
   double noise = 0.0;     ///< standard deviation [grey levels], >= 0
   double exposure = 0.0;  ///< time over which motion blurs [s], >= 0
-  int supersampling = 2;  ///< rays a pixel has along each side, 1 to 4
+  int supersampling = 2;  ///< a pixel is the mean of this many rays along each side, 1 to 4
 };
 
-/** grey = gain x (1 + gradient u) x radiance + offset, u from -0.5 to 0.5 across the image. */
+/** grey level = gain x (1 + gradient u) x radiance + offset, where u goes from -0.5 at the left to 0.5 at the right. */
 struct Light
 {
   double gain = 1.0;      ///< > 0
@@ -62,15 +64,16 @@ enum class RobotKind
   PUMA
 };
 
-/** A pose on the way, and when. */
+/** A pose of a trajectory. */
 struct Waypoint
 {
-  double time;  ///< [s]
-  Eigen::Isometry3d pose;
+  double time;             ///< [s]
+  Eigen::Isometry3d pose;  ///< as World has them
 };
 
 /**
- * Poses are those of the base for the Nomad (on the floor), and of the camera's optical frame for the Puma.
+ * A room or table, the robot in it, and the poses that experiments use. For the Nomad these are poses of its base on
+ * the floor, for the Puma those of its camera's optical frame: each is the world from that frame.
  */
 struct World
 {
@@ -79,47 +82,51 @@ struct World
   Eigen::Isometry3d robot_base = Eigen::Isometry3d::Identity();  ///< world from the Puma's base_link
   Camera camera;
   Eigen::Isometry3d camera_on_base = Eigen::Isometry3d::Identity();  ///< the Nomad's base_link from optical frame
-  double camera_rate = 10.0;                                         ///< images a second
+  double camera_rate = 10.0;                                         ///< of images [Hz]
   ImageQuality quality;
   Light light;
-  double background = 128.0;      ///< where nothing is [grey levels]
-  std::vector<cv::Mat> textures;  ///< 8-bit, one channel
+  double background = 128.0;      ///< where no surface is seen [grey levels]
+  std::vector<cv::Mat> textures;  ///< 8-bit with one channel
   std::vector<Surface> surfaces;
   std::vector<Obstacle> obstacles;
-  Eigen::Isometry3d goal = Eigen::Isometry3d::Identity();
+  Eigen::Isometry3d goal = Eigen::Isometry3d::Identity();  ///< where the view is stored
   cv::Rect region;  ///< of interest, in the view at the goal [px]; empty: all of it
   std::map<std::string, Eigen::Isometry3d> starts;
   std::map<std::string, std::vector<Waypoint>> trajectories;
 
-  /** The start of a name. @throws std::invalid_argument that lists the names there are. */
+  /** @throws std::invalid_argument that lists the names of all starts, when there is none of this name. */
   const Eigen::Isometry3d& start(const std::string& start_name) const;
-  /** As start(). */
+  /** @throws std::invalid_argument as start() does. */
   const std::vector<Waypoint>& trajectory(const std::string& trajectory_name) const;
 };
 
-/**
- * Reads a world.
- * @throws std::invalid_argument with the file's name, the line and what is wrong there.
- */
-World readWorld(const std::string& file);
+/** The world with another noise of images [grey levels]; a negative one leaves it as it is. */
+World withImageNoise(World world, double noise);
 
-/** Reads a world by its file, or by the name that a file has in a directory. @throws std::invalid_argument as
- * readWorld(), or when there is none. */
-World findWorld(const std::string& file_or_name, const std::filesystem::path& directory);
+/** A calibration whose focal lengths are too long by this part of them: 0.01 is one per cent. */
+Camera withFocalLengthError(Camera camera, double error);
 
-/** Pose on the floor: position (x, y), turned by yaw about z [rad]. */
+/** The pose on the floor at (x, y), turned by yaw about z [rad]. */
 Eigen::Isometry3d planarPose(double x, double y, double yaw);
 
-/** Yaw of a pose [rad]: of its x axis about the world's z. */
+/** The angle from the world's x axis to that of a pose, about the world's z axis [rad]. */
 double yawOf(const Eigen::Isometry3d& pose);
 
-/** Pose of an optical frame at a point that looks at another, its x axis level, then turned by `roll` about z [rad]. */
+/**
+ * The pose of an optical frame that looks from a point at another, its x axis level, then turned by `roll` about z
+ * [rad].
+ */
 Eigen::Isometry3d lookingAt(const Eigen::Vector3d& position, const Eigen::Vector3d& target, double roll);
 
-/** Whether a disc on the floor touches an obstacle. Which one, or an empty string. */
+/**
+ * The name of an obstacle that a disc on the floor touches; "an obstacle" when it has none, empty when it touches none.
+ */
 std::string touchedObstacle(const World& world, const Eigen::Vector2d& centre, double radius);
 
-/** The pose at a time: held before the first and after the last waypoint, straight and evenly turning between two. */
+/**
+ * The pose of a trajectory at a time [s]: between two waypoints on a straight line, turning evenly; before the first
+ * and after the last one their own poses. The trajectory has at least one waypoint.
+ */
 Eigen::Isometry3d poseAt(const std::vector<Waypoint>& trajectory, double time);
 
 }  // namespace view_servo::sim

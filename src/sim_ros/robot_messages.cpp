@@ -95,13 +95,7 @@ sensor_msgs::JointState toJointState(const Puma& puma, const Puma::Joints& measu
 
 sensor_msgs::CameraInfo toCameraInfo(const World& world, double focal_length_error, const ros::Time& stamp)
 {
-  Camera camera = world.camera;
-  for (const int i : { 0, 1 })
-  {
-    camera.k(i, i) *= 1.0 + focal_length_error;
-    camera.projection(i, i) *= 1.0 + focal_length_error;
-  }
-  return view_servo::toCameraInfo(camera, header(CAMERA_FRAME, stamp));
+  return view_servo::toCameraInfo(withFocalLengthError(world.camera, focal_length_error), header(CAMERA_FRAME, stamp));
 }
 
 }  // namespace view_servo::sim

@@ -19,8 +19,9 @@
 namespace view_servo::sim
 {
 /** @file
- * What the simulated robots tell, the same live and in bags. Frames, by REP 105 and 103: `odom` -> `base_link` ->
- * `camera_optical_frame`; the Puma has no `odom`. `world`, of the ground truth alone, is in no tf tree.
+ * The messages of simulated robots, the same from nodes and in bags. Their frames follow REP 105 and 103: `odom` ->
+ * `base_link` -> `camera_optical_frame`; the Puma has no `odom`. `world`, the frame of the ground truth, is in no tf
+ * tree.
  */
 
 constexpr char WORLD_FRAME[] = "world";
@@ -29,25 +30,25 @@ constexpr char BASE_FRAME[] = "base_link";
 constexpr char CAMERA_FRAME[] = "camera_optical_frame";
 
 geometry_msgs::Pose toPose(const Eigen::Isometry3d& pose);
-/** @throws std::invalid_argument when it is not finite or its quaternion is not of length 1 (within 1 %). */
+/** @throws std::invalid_argument when the pose is not finite or its quaternion is not of length 1 (within 1 %). */
 Eigen::Isometry3d toIsometry(const geometry_msgs::Pose& pose);
 
-/** Target <- source: the pose of `child` in `parent`. */
+/** The transform from `child` to `parent`. @param pose parent from child. */
 geometry_msgs::TransformStamped toTransform(const Eigen::Isometry3d& pose, const std::string& parent,
                                             const std::string& child, const ros::Time& stamp);
 
-/** The camera's true pose in the world. */
+/** @param camera world from the true camera's optical frame. */
 geometry_msgs::PoseStamped toGroundTruth(const Eigen::Isometry3d& camera, const ros::Time& stamp);
 
-/** What the base's odometry says: the pose in `odom`, the velocity in `base_link`. */
+/** The odometry of the base: its pose in `odom`, its velocity in `base_link`. */
 nav_msgs::Odometry toOdometry(const Nomad& nomad, const ros::Time& stamp);
 
-/** What the arm's encoders say, given one reading of them. */
+/** The state of the arm's joints: positions as `measured` [rad], the true velocities [rad/s]. */
 sensor_msgs::JointState toJointState(const Puma& puma, const Puma::Joints& measured, const ros::Time& stamp);
 
 /**
- * The calibration that a robot has of its camera.
- * @param focal_length_error by which part the focal lengths are too long.
+ * The calibration that a robot believes its camera to have.
+ * @param focal_length_error by which part its focal lengths are too long.
  */
 sensor_msgs::CameraInfo toCameraInfo(const World& world, double focal_length_error, const ros::Time& stamp);
 

@@ -2,8 +2,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include "sim/world_reader.h"
 #include "sim_ros/robot_messages.h"
-#include "sim/world.h"
 #include "view_servo/SaveView.h"
 #include "view_servo/ServoStatus.h"
 #include "view_servo/SetPose.h"
@@ -52,9 +52,9 @@ struct RunParams
 };
 
 /**
- * What runs of simulated robots share: the view is stored at the world's goal, the robot goes to a start, and the action that
- * brings it back is called; how far off it ends is measured by the ground truth. All waits are by a steady clock, end after
- * `RunParams::patience`, and say what they wait for.
+ * What runs of simulated robots share: the view is stored at the world's goal, the robot goes to a start, and the
+ * action that brings it back is called; how far off it ends is measured by the ground truth. All waits are by a steady
+ * clock, end after `RunParams::patience`, and say what they wait for.
  */
 template <typename Action>
 class SimulatedRun
@@ -70,8 +70,8 @@ public:
   }
 
   /**
-   * Waits for everything that a run needs: the simulation tells where the camera is, images arrive, the services and the
-   * action are offered.
+   * Waits for everything that a run needs: the simulation tells where the camera is, images arrive, the services and
+   * the action are offered.
    * @param others services besides those that every run calls.
    * @throws std::runtime_error naming what does not come.
    */
@@ -224,9 +224,9 @@ private:
   }
 
   /**
-   * Calls a service. roscpp gives its calls no deadline, and one whose other side hangs or resets the connection may never
-   * return. So the call is made by a thread of its own that shares nothing with this object; when it takes too long the
-   * whole process ends, without destroying anything that the thread may still use.
+   * Calls a service. roscpp gives its calls no deadline, and one whose other side hangs or resets the connection may
+   * never return. So the call is made by a thread of its own that shares nothing with this object; when it takes too
+   * long the whole process ends, without destroying anything that the thread may still use.
    * @throws std::runtime_error when the answer is no.
    */
   template <typename Service>
@@ -341,9 +341,9 @@ inline bool isRoslaunch(pid_t process)
 }
 
 /**
- * Ends a run's process group in the way that leaves nothing red on the terminal: roslaunch, when it is the parent, is asked
- * to end as Ctrl-C asks it, and it then ends this process with the others. Did this process end first, roslaunch would
- * report that a required process has died, which is right only when it crashes.
+ * Ends a run's process group in the way that leaves nothing red on the terminal: roslaunch, when it is the parent, is
+ * asked to end as Ctrl-C asks it, and it then ends this process with the others. Did this process end first, roslaunch
+ * would report that a required process has died, which is right only when it crashes.
  */
 inline void endWithRoslaunch()
 {

@@ -2,9 +2,10 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-#include "sim_ros/robot_messages.h"
 #include "sim/renderer.h"
-#include "sim/world.h"
+#include "sim/world_reader.h"
+#include "sim_ros/robot.h"
+#include "sim_ros/robot_messages.h"
 #include "view_servo/SetLight.h"
 #include "view_servo/SetPose.h"
 #include "view_servo/ros/conversions.h"
@@ -35,7 +36,7 @@
 
 namespace view_servo::sim
 {
-/** What the nodes of all simulated robots can be told. */
+/** The parameters that the nodes of all simulated robots have. */
 struct SimulationParams
 {
   std::string world = "desk";
@@ -62,21 +63,21 @@ struct SimulationParams
     reader.require(control_rate >= 10.0 && control_rate <= 1000.0, "~control_rate must lie in [10, 1000] Hz");
   }
 
-  /** The world of that name, or in that file, with the noise asked for. */
+  /**
+   * Reads the world, and gives its camera the noise asked for. @throws std::invalid_argument when it is for another
+   * robot.
+   */
   World load(RobotKind robot) const
   {
-    World result = findWorld(world, ros::package::getPath("view_servo") + "/config/worlds");
+    const World result = findWorld(world, ros::package::getPath("view_servo") + "/config/worlds");
     if (result.robot != robot)
     {
       throw std::invalid_argument("world '" + result.name + "' is for another robot");
     }
-    if (image_noise >= 0.0)
-    {
-      result.quality.noise = image_noise;
-    }
-    return result;
+    return withImageNoise(result, image_noise);
   }
 
+  /** The names in `groups`, which are separated by commas. */
   std::vector<std::string> groupNames() const
   {
     std::vector<std::string> names;
@@ -90,16 +91,16 @@ struct SimulationParams
 };
 
 /**
- * A robot with a camera in a simulated world, on wall time.
+ * The node of a simulated robot that carries a camera. It runs on wall time.
  *
  * Parameters, all private:
  *  - `~world` (string, default "desk"): a world file, or the name of one in `config/worlds/`;
  *  - `~start` (string, default ""): where to begin, one of the world's starts; "" = its goal;
  *  - `~groups` (string, default ""): groups of surfaces to show, separated by commas;
  *  - `~seed` (int, default 1): of all noise;
- *  - `~image_noise` (double, default -1 [grey levels]): instead of the world's; negative = the world's;
- *  - `~focal_length_error` (double, default 0): by which part `camera_info` says the focal lengths too long;
- *  - `~control_rate` (double, default 50 [Hz]): of the robot's motion and state;
+ *  - `~image_noise` (double, default -1 [grey levels]): standard deviation; negative = the world's;
+ *  - `~focal_length_error` (double, default 0): by which part the focal lengths in `camera_info` are too long;
+ *  - `~control_rate` (double, default 50 [Hz]): rate at which the robot moves and publishes its state;
  *  - those of the robot.
  *
  * Publishes:
@@ -107,20 +108,26 @@ struct SimulationParams
  *    world's rate or as fast as it can be drawn;
  *  - `ground_truth` (geometry_msgs/PoseStamped): the camera's true pose in `world`, with the stamp of each image;
  *  - `/diagnostics` (diagnostic_msgs/DiagnosticArray): 1 Hz;
- *  - what the robot says of itself.
+ *  - the messages of the robot's other sensors.
  *
  * Subscribes:
- *  - `cmd_vel`: what to do until the next command, or for 0.2 s of wall time, after which the robot brakes.
+ *  - `cmd_vel`: the command to follow until the next one comes, or for 0.2 s of wall time, after which the robot
+ *    brakes.
  *
  * Services:
  *  - `~set_pose` (view_servo/SetPose), `~set_light` (view_servo/SetLight).
  *
- * The camera draws in a thread of its own, since that takes longer than a cycle of control. A Robot is a type with
- *  - `KIND`, `Params` with `read(ParameterReader&)`, `Command` (a message);
- *  - a constructor from world, seed, parameters and node handle;
- *  - `command(Command)`, `halt()`, `step(dt)`, `setPose(pose)`, `cameraPose()`, `publish(stamp)`, `diagnose(status)`.
+ * The camera draws in a thread of its own, since that takes longer than a cycle of control.
+ *
+ * An Interface is how one kind of robot is reached over ROS. It has
+ *  - the types `Robot` (a sim::Robot), `Command` (the message on `cmd_vel`) and `Params`, the robot's parameters with
+ *    `seed` and `read(ParameterReader&)`; and the constant `KIND`;
+ *  - `static std::unique_ptr<Robot> makeRobot(world, params, node_handle)`;
+ *  - a constructor from the robot and a node handle, which advertises;
+ *  - `static std::optional<Robot::Twist> toTwist(command)`, empty when the command must be refused;
+ *  - `publish(robot, stamp)`, which reads the robot's sensors, and `static diagnose(robot, status)`.
  */
-template <typename Robot>
+template <typename Interface>
 class SimulationNode : private NodeBase
 {
 public:
@@ -134,12 +141,14 @@ public:
     }
     ParameterReader reader(private_nh_);
     params_.read(reader);
-    typename Robot::Params robot_params;
+    typename Interface::Params robot_params;
+    robot_params.seed = static_cast<std::uint64_t>(params_.seed);
     robot_params.read(reader);
     reader.finish();
-    world_ = params_.load(Robot::KIND);
+    world_ = params_.load(Interface::KIND);
     camera_ = std::make_unique<SimulatedCamera>(world_, params_.groupNames(), static_cast<std::uint64_t>(params_.seed));
-    robot_ = std::make_unique<Robot>(world_, static_cast<std::uint64_t>(params_.seed), robot_params, nh_);
+    robot_ = Interface::makeRobot(world_, robot_params, nh_);
+    interface_ = std::make_unique<Interface>(*robot_, nh_);
     robot_->setPose(world_.goal);
     if (!params_.start.empty())
     {
@@ -148,8 +157,8 @@ public:
 
     image_publisher_ = images_.advertiseCamera("camera/image_raw", 2);
     ground_truth_publisher_ = nh_.advertise<geometry_msgs::PoseStamped>("ground_truth", 10);
-    command_subscriber_ = subscribe<typename Robot::Command>(
-        "cmd_vel", 1, [this](const typename Robot::Command::ConstPtr& message) { command(message); });
+    command_subscriber_ =
+        subscribe<Command>("cmd_vel", 1, [this](const typename Command::ConstPtr& message) { command(message); });
     set_pose_service_ = serve("set_pose", &SimulationNode::setPose, this);
     set_light_service_ = serve("set_light", &SimulationNode::setLight, this);
     diagnostics_.add("robot", this, &SimulationNode::diagnose);
@@ -166,8 +175,9 @@ public:
 
 private:
   using Clock = std::chrono::steady_clock;
+  using Command = typename Interface::Command;
 
-  /** A command holds so long [s]; with a cycle of control the robot stands within 0.25 s. */
+  /** How long a command holds [s]. With a cycle of control and the time to brake the robot stands within 0.25 s. */
   static constexpr double COMMAND_TIMEOUT = 0.2;
 
   static double since(Clock::time_point then)
@@ -175,7 +185,7 @@ private:
     return std::chrono::duration<double>(Clock::now() - then).count();
   }
 
-  /** Moves the robot on to now. The robot's mutex is held. */
+  /** Simulates the robot up to the present time. The caller holds the robot's mutex. */
   void advance()
   {
     constexpr double MAX_STEP = 0.005;  // [s]
@@ -199,14 +209,15 @@ private:
   {
     const std::lock_guard<std::mutex> lock(robot_mutex_);
     advance();
-    robot_->publish(ros::Time::now());
+    interface_->publish(*robot_, ros::Time::now());
   }
 
-  void command(const typename Robot::Command::ConstPtr& message)
+  void command(const typename Command::ConstPtr& message)
   {
     const std::lock_guard<std::mutex> lock(robot_mutex_);
     advance();
-    if (!robot_->command(*message))
+    const auto twist = Interface::toTwist(*message);
+    if (!twist || !robot_->command(*twist))
     {
       ROS_ERROR_STREAM_THROTTLE(
           1.0, "refused a command on " << command_subscriber_.getTopic() << ": not finite, or in another frame");
@@ -250,7 +261,7 @@ private:
 
   void takeImage()
   {
-    constexpr int EXPOSED = 5;  // poses over the exposure, whose middle the stamp tells
+    constexpr int EXPOSED = 5;  // poses spread over the exposure; the stamp is that of its middle
     std::vector<Eigen::Isometry3d> poses;
     ros::Time stamp;
     {
@@ -288,7 +299,7 @@ private:
   void diagnose(diagnostic_updater::DiagnosticStatusWrapper& status)
   {
     const std::lock_guard<std::mutex> lock(robot_mutex_);
-    robot_->diagnose(status);
+    Interface::diagnose(*robot_, status);
     status.add("world", world_.name);
   }
 
@@ -298,11 +309,12 @@ private:
   std::mutex camera_mutex_;
   std::unique_ptr<SimulatedCamera> camera_;
   std::mutex robot_mutex_;
-  std::unique_ptr<Robot> robot_;
+  std::unique_ptr<typename Interface::Robot> robot_;
+  std::unique_ptr<Interface> interface_;
   Clock::time_point last_step_;
   Clock::time_point last_command_;
   bool commanded_ = false;
-  std::vector<Waypoint> last_view_;  // the camera's pose at the last image; empty before the first
+  std::vector<Waypoint> last_view_;  // the camera's pose at the last image, alone; empty before the first
   std::atomic<bool> running_{ true };
   image_transport::CameraPublisher image_publisher_;
   ros::Publisher ground_truth_publisher_;

@@ -3,14 +3,14 @@
 #include "command_line.h"
 #include "view_servo/features/line_segments.h"
 #include "view_servo/geometry/correspondence.h"
-#include "view_servo/matching/line_features.h"
 #include "view_servo/images/image_io.h"
+#include "view_servo/matching/line_features.h"
+#include "view_servo/parameters/parameter.h"
 #include "view_servo/views/line_view_matcher.h"
-#include "view_servo/views/matcher_parameters.h"
 #include "view_servo/views/overlay.h"
+#include "view_servo/views/point_view_matcher.h"
 #include "view_servo/views/prepared_image.h"
 #include "view_servo/views/segment_io.h"
-#include "view_servo/views/point_view_matcher.h"
 
 #include <CLI/CLI.hpp>
 #include <Eigen/Geometry>
@@ -136,7 +136,7 @@ Matcher makeMatcher(const std::vector<std::string>& settings)
     }
     try
     {
-      setParameter(params, setting.substr(0, equals), setting.substr(equals + 1));
+      setParameter(parameters(params), setting.substr(0, equals), setting.substr(equals + 1));
     }
     catch (const std::invalid_argument& error)
     {
@@ -377,10 +377,11 @@ void listParameters(const std::string& subcommand)
 {
   Params defaults;
   std::cout << subcommand << ":\n";
-  for (const Parameter& parameter : matcherParameters(defaults))
+  for (const Parameter& parameter : parameters(defaults))
   {
     std::cout << "  " << parameter.name << " (" << parameter.type << ", default " << parameter.get()
-              << "): " << parameter.description << '\n';
+              << (parameter.unit.empty() ? "" : " " + parameter.unit)
+              << (parameter.range.empty() ? "" : ", " + parameter.range) << "): " << parameter.description << '\n';
   }
 }
 

@@ -1,21 +1,20 @@
 // Copyright (c) 2026, the view_servo authors
 // SPDX-License-Identifier: BSD-3-Clause
-#include "command_line.h"
-#include "sim_ros/robot_messages.h"
-#include "tools/package_folder.h"
-#include "sim/nomad.h"
-#include "sim/puma.h"
 #include "sim/renderer.h"
-#include "sim/world.h"
-#include "view_servo/ros/conversions.h"
+#include "sim/world_reader.h"
+#include "sim_ros/bag_writer.h"
+#include "sim_ros/nomad_robot.h"
+#include "sim_ros/puma_robot.h"
+#include "sim_ros/robot_messages.h"
+#include "tools/command_line.h"
+#include "tools/package_folder.h"
 #include "view_servo/images/image_io.h"
+#include "view_servo/ros/conversions.h"
 
-#include <rosbag/bag.h>
 #include <sensor_msgs/image_encodings.h>
 #include <tf2_msgs/TFMessage.h>
 #include <CLI/CLI.hpp>
 #include <Eigen/Geometry>
-#include <boost/make_shared.hpp>
 #include <opencv2/core/utils/logger.hpp>
 
 #include <cmath>
@@ -30,7 +29,6 @@
 #include <sstream>
 #include <stdexcept>
 #include <string>
-#include <system_error>
 #include <vector>
 
 /** @file
@@ -64,13 +62,6 @@ constexpr double MAX_DURATION = 3600.0;  // of a trajectory [s]
 constexpr double TRACKING_GAIN = 2.0;    // of the way back to the trajectory [1/s]
 constexpr int BLUR_POSES = 5;            // seen during an exposure
 
-/** Something the user can put right; what() names the file or option. */
-class BadInput : public std::runtime_error
-{
-public:
-  using std::runtime_error::runtime_error;
-};
-
 /** What is not set is as the world says, or perfect. */
 struct Options
 {
@@ -89,83 +80,6 @@ struct Options
   std::optional<double> odometry_drift;
   std::optional<double> odometry_noise;
   std::optional<double> encoder_noise;
-};
-
-/** A bag that appears under its name when it is complete. */
-class BagWriter
-{
-public:
-  explicit BagWriter(const std::string& file) : file_(file), partial_(file + ".partial")
-  {
-    if (fs::is_directory(file_))
-    {
-      throw BadInput("cannot write '" + file_ + "': it is a folder");
-    }
-    explained([this] { bag_->open(partial_, rosbag::bagmode::Write); });
-    bag_->setCompression(rosbag::compression::BZ2);
-  }
-
-  ~BagWriter()
-  {
-    try
-    {
-      bag_->close();
-    }
-    catch (const rosbag::BagException&)
-    {
-      static_cast<void>(bag_.release());  // its destructor would try once more, and end the program
-    }
-    std::error_code ignored;
-    fs::remove(partial_, ignored);
-  }
-  BagWriter(const BagWriter&) = delete;
-  BagWriter& operator=(const BagWriter&) = delete;
-
-  template <typename Message>
-  void write(const std::string& topic, const ros::Time& stamp, const Message& message)
-  {
-    explained([&] { bag_->write(topic, stamp, message); });
-  }
-
-  /** Players keep it for those who come later. */
-  template <typename Message>
-  void writeLatched(const std::string& topic, const ros::Time& stamp, const Message& message)
-  {
-    const auto header = boost::make_shared<ros::M_string>();
-    (*header)["topic"] = topic;
-    (*header)["type"] = ros::message_traits::datatype(message);
-    (*header)["md5sum"] = ros::message_traits::md5sum(message);
-    (*header)["message_definition"] = ros::message_traits::definition(message);
-    (*header)["latching"] = "1";
-    explained([&] { bag_->write(topic, stamp, message, header); });
-  }
-
-  void finish()
-  {
-    explained([this] {
-      bag_->close();
-      fs::rename(partial_, file_);
-    });
-  }
-
-private:
-  /** Does it, and names the file when that fails. */
-  template <typename Action>
-  void explained(const Action& action)
-  {
-    try
-    {
-      action();
-    }
-    catch (const std::exception& error)
-    {
-      throw BadInput("cannot write '" + file_ + "': " + error.what());
-    }
-  }
-
-  std::string file_;
-  std::string partial_;
-  std::unique_ptr<rosbag::Bag> bag_ = std::make_unique<rosbag::Bag>();
 };
 
 tf2_msgs::TFMessage toTf(const geometry_msgs::TransformStamped& transform)
@@ -196,115 +110,31 @@ ros::Time startOf(const Options& options)
 
 // ------------------------------------------------------------------------------------------------ simulated robots
 
-/** [v; ω] of a frame, in that frame [m/s, rad/s]. */
-using Twist = Eigen::Matrix<double, 6, 1>;
+using Twist = sim::Robot::Twist;
 
-/** A robot that a trajectory leads. */
-class Robot
+/** Writes the pose of the camera on the robot, where that is fixed. */
+void writeCameraMount(BagWriter& bag, const sim::Robot& robot, const ros::Time& stamp)
 {
-public:
-  virtual ~Robot() = default;
-  /** World from the frame whose poses a trajectory holds. */
-  virtual Eigen::Isometry3d pose() const = 0;
-  /** World from the true optical frame. */
-  virtual Eigen::Isometry3d cameraPose() const = 0;
-  /** Moves that frame for DT. @return what keeps it from doing so; empty: nothing. */
-  virtual std::string move(const Twist& twist) = 0;
-  /** Writes what holds for the whole bag. */
-  virtual void writeCalibration(BagWriter& bag, const ros::Time& stamp) const = 0;
-  /** Writes what its sensors, apart from the camera, say now. */
-  virtual void writeSensors(BagWriter& bag, const ros::Time& stamp) = 0;
-};
+  if (const auto mount = robot.cameraMount(stamp))
+  {
+    bag.writeLatched(TF_STATIC_TOPIC, stamp, toTf(*mount));
+  }
+}
 
-class NomadRobot : public Robot
+/** Writes a reading of all sensors but the camera. */
+void writeSensors(BagWriter& bag, sim::Robot& robot, const ros::Time& stamp)
 {
-public:
-  NomadRobot(const sim::World& world, const sim::NomadParams& params, const Eigen::Isometry3d& start)
-    : world_(world), nomad_(world, params)
+  const sim::SensorMessages messages = robot.readSensors(stamp);
+  bag.write(TF_TOPIC, stamp, toTf(messages.transform));
+  if (messages.odometry)
   {
-    nomad_.setPose(start);
+    bag.write(ODOMETRY_TOPIC, stamp, *messages.odometry);
   }
-
-  Eigen::Isometry3d pose() const override
+  if (messages.joints)
   {
-    return nomad_.pose();
+    bag.write(JOINT_STATES_TOPIC, stamp, *messages.joints);
   }
-
-  Eigen::Isometry3d cameraPose() const override
-  {
-    return nomad_.cameraPose();
-  }
-
-  std::string move(const Twist& twist) override
-  {
-    nomad_.command({ twist(0), twist(1), twist(5) });
-    nomad_.step(DT);
-    return nomad_.blockedBy().empty() ? "" : nomad_.blockedBy() + " is in the way";
-  }
-
-  void writeCalibration(BagWriter& bag, const ros::Time& stamp) const override
-  {
-    bag.writeLatched(TF_STATIC_TOPIC, stamp,
-                     toTf(sim::toTransform(world_.camera_on_base, sim::BASE_FRAME, sim::CAMERA_FRAME, stamp)));
-  }
-
-  void writeSensors(BagWriter& bag, const ros::Time& stamp) override
-  {
-    bag.write(TF_TOPIC, stamp, toTf(sim::toTransform(nomad_.odometry(), sim::ODOM_FRAME, sim::BASE_FRAME, stamp)));
-    bag.write(ODOMETRY_TOPIC, stamp, sim::toOdometry(nomad_, stamp));
-  }
-
-private:
-  const sim::World& world_;
-  sim::Nomad nomad_;
-};
-
-class PumaRobot : public Robot
-{
-public:
-  PumaRobot(const sim::World& world, const std::string& urdf, const sim::PumaParams& params,
-            const Eigen::Isometry3d& start)
-    : world_(world), puma_(urdf, params)
-  {
-    if (!puma_.setCameraPose(world.robot_base.inverse() * start))
-    {
-      throw BadInput("its start is out of the arm's reach");
-    }
-  }
-
-  Eigen::Isometry3d pose() const override
-  {
-    return cameraPose();
-  }
-
-  Eigen::Isometry3d cameraPose() const override
-  {
-    return world_.robot_base * puma_.cameraPose();
-  }
-
-  std::string move(const Twist& twist) override
-  {
-    puma_.command(twist);
-    puma_.step(DT);
-    return puma_.state() == sim::Puma::State::AT_LIMIT ? puma_.message() : "";
-  }
-
-  void writeCalibration(BagWriter&, const ros::Time&) const override
-  {
-  }
-
-  void writeSensors(BagWriter& bag, const ros::Time& stamp) override
-  {
-    const sim::Puma::Joints joints = puma_.measuredJoints();
-    const Eigen::Isometry3d camera = puma_.nominalCameraPose(joints);
-    bag.write(TF_TOPIC, stamp, toTf(sim::toTransform(camera, sim::BASE_FRAME, sim::CAMERA_FRAME, stamp)));
-    bag.write(JOINT_STATES_TOPIC, stamp, sim::toJointState(puma_, joints, stamp));
-  }
-
-private:
-  const sim::World& world_;
-  sim::Puma puma_;
-};
+}
 
 /** Rotation vector. */
 Eigen::Vector3d logOf(const Eigen::Matrix3d& rotation)
@@ -374,7 +204,7 @@ std::string textOf(const std::string& path)
   std::string text(std::istreambuf_iterator<char>(file), {});
   if (!file)
   {
-    throw BadInput("cannot read '" + path + "'");
+    throw std::runtime_error("cannot read '" + path + "'");
   }
   return text;
 }
@@ -383,11 +213,11 @@ void refuse(const std::optional<double>& value, const std::string& option, const
 {
   if (value)
   {
-    throw BadInput(option + ": " + reason);
+    throw std::runtime_error(option + ": " + reason);
   }
 }
 
-std::unique_ptr<Robot> makeRobot(const sim::World& world, const Options& options, const Eigen::Isometry3d& start)
+std::unique_ptr<sim::Robot> makeRobot(const sim::World& world, const Options& options)
 {
   if (world.robot == sim::RobotKind::NOMAD)
   {
@@ -396,7 +226,7 @@ std::unique_ptr<Robot> makeRobot(const sim::World& world, const Options& options
     params.odometry_drift = options.odometry_drift.value_or(0.0);
     params.odometry_noise = options.odometry_noise.value_or(0.0);
     params.seed = options.seed;
-    return std::make_unique<NomadRobot>(world, params, start);
+    return std::make_unique<sim::NomadRobot>(world, params);
   }
   const std::string reason = "the robot of world '" + world.name + "' has no wheels";
   refuse(options.odometry_drift, "--odometry-drift", reason);
@@ -405,7 +235,7 @@ std::unique_ptr<Robot> makeRobot(const sim::World& world, const Options& options
   params.encoder_noise = options.encoder_noise.value_or(0.0);
   params.seed = options.seed;
   const std::string urdf = options.urdf.empty() ? (packageFolder() / "urdf" / "puma560.urdf").string() : options.urdf;
-  return std::make_unique<PumaRobot>(world, textOf(urdf), params, start);
+  return std::make_unique<sim::PumaRobot>(world, textOf(urdf), params);
 }
 
 void recordSimulation(const std::string& world_name, const std::string& trajectory_name, const std::string& file,
@@ -421,7 +251,7 @@ void recordSimulation(const std::string& world_name, const std::string& trajecto
     return sim::poseAt(trajectory, trajectory.front().time + step * DT);
   };
   const auto fault = [&](const std::string& what) {
-    return BadInput("trajectory '" + trajectory_name + "' of world '" + world.name + "': " + what);
+    return std::runtime_error("trajectory '" + trajectory_name + "' of world '" + world.name + "': " + what);
   };
   if (duration > MAX_DURATION)
   {
@@ -429,10 +259,11 @@ void recordSimulation(const std::string& world_name, const std::string& trajecto
   }
 
   sim::SimulatedCamera camera(world, options.groups, options.seed);
-  std::unique_ptr<Robot> robot;
+  std::unique_ptr<sim::Robot> robot;
   try
   {
-    robot = makeRobot(world, options, trajectory.front().pose);
+    robot = makeRobot(world, options);
+    robot->setPose(trajectory.front().pose);
   }
   catch (const std::exception& error)
   {
@@ -441,7 +272,7 @@ void recordSimulation(const std::string& world_name, const std::string& trajecto
 
   BagWriter bag(file);
   const ros::Time start = startOf(options);
-  robot->writeCalibration(bag, start);
+  writeCameraMount(bag, *robot, start);
   Eigen::Isometry3d camera_before = robot->cameraPose();
   const int last_step = static_cast<int>(std::lround(duration / DT));
   for (int step = 0; step <= last_step; ++step)
@@ -452,7 +283,7 @@ void recordSimulation(const std::string& world_name, const std::string& trajecto
     const bool sensors_due = isDue(step, options.odometry_rate);
     if (sensors_due)
     {
-      robot->writeSensors(bag, stamp);
+      writeSensors(bag, *robot, stamp);
     }
     if (sensors_due || image_due)
     {
@@ -464,7 +295,9 @@ void recordSimulation(const std::string& world_name, const std::string& trajecto
                  sim::toCameraInfo(world, options.focal_length_error, stamp));
     }
     camera_before = camera_pose;
-    const std::string obstruction = robot->move(trackingTwist(robot->pose(), wanted_at(step), wanted_at(step + 1)));
+    robot->command(trackingTwist(robot->pose(), wanted_at(step), wanted_at(step + 1)));
+    robot->step(DT);
+    const std::string obstruction = robot->obstruction();
     if (!obstruction.empty() && step < last_step)
     {
       throw fault(obstruction + " after " + std::to_string(step * DT) + " s");
@@ -507,7 +340,7 @@ std::vector<PosedImage> readPoses(const fs::path& path)
     if (!matrix.allFinite() || !rotation.isUnitary(TOLERANCE) || rotation.determinant() < 0.0 ||
         !matrix.row(3).isApprox(Eigen::RowVector4d(0.0, 0.0, 0.0, 1.0)))
     {
-      throw BadInput(path.string() + ": line " + std::to_string(number) + " is no file's name with a pose");
+      throw std::runtime_error(path.string() + ": line " + std::to_string(number) + " is no file's name with a pose");
     }
     image.pose = Eigen::Isometry3d(Eigen::Quaterniond(rotation).normalized());
     image.pose.translation() = matrix.topRightCorner<3, 1>();
@@ -515,7 +348,7 @@ std::vector<PosedImage> readPoses(const fs::path& path)
   }
   if (images.empty())
   {
-    throw BadInput(path.string() + ": no poses");
+    throw std::runtime_error(path.string() + ": no poses");
   }
   return images;
 }
@@ -531,7 +364,7 @@ Eigen::Matrix3d readIntrinsics(const fs::path& path)
   }
   if (!k.allFinite() || !(k(0, 0) > 0.0) || !(k(1, 1) > 0.0) || k(2, 2) != 1.0)
   {
-    throw BadInput(path.string() + ": no 3 x 3 matrix of intrinsics");
+    throw std::runtime_error(path.string() + ": no 3 x 3 matrix of intrinsics");
   }
   return k;
 }
@@ -556,7 +389,7 @@ void recordImages(const std::string& file, const Options& options)
     const cv::Mat image = readGreyImage(path.string());
     if (i > 0 && image.size() != cv::Size(camera.width, camera.height))
     {
-      throw BadInput(path.string() + ": not of the size of those before");
+      throw std::runtime_error(path.string() + ": not of the size of those before");
     }
     camera.width = image.cols;
     camera.height = image.rows;
@@ -633,14 +466,14 @@ void record(const Options& options)
   {
     if (options.names.size() != 1)
     {
-      throw BadInput("say where to: record_bag --images FOLDER OUT.bag");
+      throw std::runtime_error("say where to: record_bag --images FOLDER OUT.bag");
     }
     recordImages(options.names.front(), options);
     return;
   }
   if (options.names.size() != 3)
   {
-    throw BadInput("say what to record and where to: record_bag WORLD TRAJECTORY OUT.bag");
+    throw std::runtime_error("say what to record and where to: record_bag WORLD TRAJECTORY OUT.bag");
   }
   recordSimulation(options.names[0], options.names[1], options.names[2], options);
 }

@@ -137,17 +137,23 @@ struct FoundCorner
 
 }  // namespace
 
+std::vector<Parameter> parameters(HomographyAlignerParams& params)
+{
+  return {
+    integer("max_points", params.max_points, "", ">= 12", "corners of the view that are looked for"),
+    integer("patch_radius", params.patch_radius, "px", "[2, 20]", "half the side of the patches that are compared"),
+    integer("levels", params.levels, "", "[1, 6]", "levels of the image pyramid, the image among them"),
+    real("min_correlation", params.min_correlation, "", "[0, 1)", "least correlation of a patch that is found again"),
+    real("max_residual", params.max_residual, "px", "> 0", "largest error of a point that supports the homography"),
+    integer("min_supporting", params.min_supporting, "", ">= 5", "points that make a homography"),
+    real("min_support", params.min_support, "", "(0, 1]", "part of the points in sight that makes one"),
+    boolean("refine", params.refine, "all pixels of the view's region refine the homography at last"),
+  };
+}
+
 std::vector<std::string> HomographyAlignerParams::validate() const
 {
-  Faults faults;
-  faults.require(max_points >= 12, "max_points must be at least 12");
-  faults.require(patch_radius >= 2 && patch_radius <= 20, "patch_radius must lie in [2, 20] px");
-  faults.require(levels >= 1 && levels <= 6, "levels must lie in [1, 6]");
-  faults.require(min_correlation >= 0.0 && min_correlation < 1.0, "min_correlation must lie in [0, 1)");
-  faults.require(max_residual > 0.0, "max_residual must be more than 0 px");
-  faults.require(min_supporting >= 5, "min_supporting must be at least 5");
-  faults.require(min_support > 0.0 && min_support <= 1.0, "min_support must lie in (0, 1]");
-  return faults.list();
+  return faultsOf(*this);
 }
 
 class HomographyAligner::Impl

@@ -13,13 +13,18 @@
 
 namespace view_servo
 {
+std::vector<Parameter> parameters(PlaneFilterParams& params)
+{
+  return {
+    real("window", params.window, "m", "> 0", "length of the camera's path over which measurements are averaged"),
+    integer("max_measurements", params.max_measurements, "", ">= 2", "measurements averaged at most"),
+    real("decision", params.decision, "", "> 1", "factor by which the wrong plane's normal must scatter more"),
+  };
+}
+
 std::vector<std::string> PlaneFilterParams::validate() const
 {
-  Faults faults;
-  faults.require(window > 0.0, "window must be more than 0 m");
-  faults.require(max_measurements >= 2, "max_measurements must be at least 2");
-  faults.require(decision > 1.0, "decision must be more than 1");
-  return faults.list();
+  return faultsOf(*this);
 }
 
 void PlaneFilter::Track::add(const EuclideanHomography& solution)

@@ -11,13 +11,19 @@
 
 namespace view_servo
 {
+std::vector<Parameter> parameters(PlaneTrackerParams& params)
+{
+  return joined({ parameters(params.tracker),
+                  parameters(params.filter),
+                  {
+                      integer("lost_after", params.lost_after, "", ">= 1",
+                              "images in a row without the plane after which it is lost"),
+                  } });
+}
+
 std::vector<std::string> PlaneTrackerParams::validate() const
 {
-  Faults faults;
-  faults.add(tracker.validate());
-  faults.add(filter.validate());
-  faults.require(lost_after >= 1, "lost_after must be at least 1");
-  return faults.list();
+  return faultsOf(*this);
 }
 
 PlaneTracker::PlaneTracker(const cv::Mat& reference, const cv::Rect& region, const Eigen::Matrix3d& k,

@@ -109,18 +109,24 @@ double depthRatio(const Landmark& landmark, const PlanarPose& pose)
 
 }  // namespace
 
+std::vector<Parameter> parameters(ViewTrackerParams& params)
+{
+  return {
+    integer("max_landmarks", params.max_landmarks, "", ">= 8", "points of the view that are tracked"),
+    integer("tracking_window", params.window, "px", "odd, >= 5", "side of their patches"),
+    integer("tracking_levels", params.levels, "", "[0, 6]", "levels of the pyramid besides the image"),
+    real("tracking_max_residual", params.max_residual, "px", "> 0", "largest error of a point that supports the pose"),
+    integer("tracking_min_supporting", params.min_supporting, "", ">= 4", "points that make a pose"),
+    real("tracking_min_support", params.min_support, "", "(0, 1]", "part of the points looked for that makes one"),
+    real("tracking_max_scale_difference", params.max_scale_difference, "", "> 0",
+         "largest difference between a point's change of size and the typical one"),
+    real("assumed_depth", params.assumed_depth, "m", "> 0", "depth of the points when nothing is known"),
+  };
+}
+
 std::vector<std::string> ViewTrackerParams::validate() const
 {
-  Faults faults;
-  faults.require(max_landmarks >= 8, "max_landmarks must be at least 8");
-  faults.require(window >= 5 && window % 2 == 1, "tracking_window must be odd and at least 5 px");
-  faults.require(levels >= 0 && levels <= 6, "tracking_levels must lie in [0, 6]");
-  faults.require(max_residual > 0.0, "tracking_max_residual must be more than 0 px");
-  faults.require(min_supporting >= 4, "tracking_min_supporting must be at least 4");
-  faults.require(min_support > 0.0 && min_support <= 1.0, "tracking_min_support must lie in (0, 1]");
-  faults.require(max_scale_difference > 0.0, "tracking_max_scale_difference must be positive");
-  faults.require(assumed_depth > 0.0, "assumed_depth must be more than 0 m");
-  return faults.list();
+  return faultsOf(*this);
 }
 
 ViewTracker::ViewTracker(const cv::Mat& reference, const Camera& camera, const CameraMount& mount,

@@ -7,34 +7,50 @@
 #include "view_servo/tracking/plane_finder.h"
 #include "view_servo/views/prepared_image.h"
 
-#include <deque>
 #include <memory>
 #include <optional>
 #include <stdexcept>
+#include <string>
 
 namespace view_servo::sim
 {
 namespace
 {
-constexpr double STEP = 0.005;    // of the arm [s]
-constexpr double SETTLING = 1.0;  // after servoing has ended, until the error is measured [s]
-constexpr double COVERED = 2.0;   // [s]
+constexpr double STEP = 0.005;    // of the simulation [s]
+constexpr double SETTLING = 1.0;  // from the end of servoing until the error is measured [s]
+constexpr double COVERED = 2.0;   // how long the camera is covered, if it is [s]
 
-/** An image on its way through tracking. */
-struct Pending
+/** What tracking makes of an image. */
+struct StampedTrack
 {
-  double ready;
-  double stamp;
+  double stamp;  // [s]
   PlaneTrack track;
 };
 
-/** Where the view has been found by its points. */
+/** Where matching finds the view. */
 struct Found
 {
-  double ready;
-  std::optional<Eigen::Matrix3d> h;
-  Eigen::Isometry3d camera_in_base;
+  std::optional<Eigen::Matrix3d> h;  // view to image; empty: nowhere
+  Eigen::Isometry3d camera_in_base;  // when the image was taken
 };
+
+Puma makePuma(const std::string& urdf_xml, const ArmTrialParams& params)
+{
+  PumaParams puma_params;
+  puma_params.encoder_noise = params.conditions.encoder_noise;
+  puma_params.hand_eye_translation_error = params.conditions.hand_eye_translation_error;
+  puma_params.hand_eye_rotation_error = params.conditions.hand_eye_rotation_error;
+  puma_params.seed = params.seed;
+  return Puma(urdf_xml, puma_params);
+}
+
+ServoTarget targetOf(const World& world, const Eigen::Matrix3d& k)
+{
+  const cv::Rect& region = world.region;
+  return { k,
+           { world.camera.width, world.camera.height },
+           { region.x + 0.5 * (region.width - 1), region.y + 0.5 * (region.height - 1) } };
+}
 
 }  // namespace
 
@@ -61,128 +77,177 @@ ArmTrials::ArmTrials(const World& world, const std::string& urdf_xml, const ArmT
 
 ArmTrials::~ArmTrials() = default;
 
-ArmOutcome ArmTrials::run(const Eigen::Isometry3d& start, const std::function<void(const ArmStep&)>& on_step)
+/** One run: what moves, what is on its way, and the steps of a cycle. */
+class ArmTrials::Run
 {
-  const ArmConditions& conditions = params_.conditions;
-  PumaParams puma_params;
-  puma_params.encoder_noise = conditions.encoder_noise;
-  puma_params.hand_eye_translation_error = conditions.hand_eye_translation_error;
-  puma_params.hand_eye_rotation_error = conditions.hand_eye_rotation_error;
-  puma_params.seed = params_.seed;
-  Puma puma(urdf_xml_, puma_params);
-  // As the one who stores the view does: first there, then away.
-  for (const Eigen::Isometry3d& pose : { world_.goal, start })
+public:
+  Run(const World& world, const std::string& urdf_xml, const ArmTrialParams& params, Parts& parts,
+      const std::function<void(const ArmStep&)>& on_step)
+    : world_(world),
+      params_(params),
+      parts_(parts),
+      on_step_(on_step),
+      puma_(makePuma(urdf_xml, params)),
+      camera_(world, params.conditions.groups, params.seed + 1),
+      k_(withFocalLengthError(world.camera, params.conditions.focal_length_error).k),
+      tracker_(parts.view->grey(), world.region, k_, params.tracker),
+      servo_(targetOf(world, k_), params.servo),
+      limiter_(params.limits),
+      control_due_(params.control_period),
+      image_due_(1.0 / world.camera_rate)
   {
-    if (!puma.setCameraPose(world_.robot_base.inverse() * pose))
+    camera_.setLight(params.conditions.light);
+  }
+
+  ArmOutcome run(const Eigen::Isometry3d& start)
+  {
+    // As somebody does who stores the view: first there, then away.
+    for (const Eigen::Isometry3d& pose : { world_.goal, start })
     {
-      throw std::invalid_argument("the arm cannot bring its camera to the goal or the start");
+      if (!puma_.setCameraPose(world_.robot_base.inverse() * pose))
+      {
+        throw std::invalid_argument("the arm cannot bring its camera to the goal or the start");
+      }
+    }
+    for (time_ = 0.0; time_ < params_.max_duration && (!end_ || time_ < *end_ + SETTLING); time_ += STEP)
+    {
+      if (!end_ && image_due_.due(time_))
+      {
+        track();
+      }
+      deliverTracks();
+      if (control_due_.due(time_))
+      {
+        control();
+      }
+      move();
+    }
+    return outcome();
+  }
+
+private:
+  /** World from the true camera. */
+  Eigen::Isometry3d cameraPose() const
+  {
+    return world_.robot_base * puma_.cameraPose();
+  }
+
+  cv::Mat takeImage()
+  {
+    cv::Mat image = camera_.capture(cameraPose());
+    const double covered_from = params_.conditions.covered_from;
+    if (covered_from >= 0.0 && time_ >= covered_from && time_ < covered_from + COVERED)
+    {
+      image.setTo(40);
+    }
+    return image;
+  }
+
+  /** Takes an image and tracks the view in it, or begins to look for the view by its points when it is not tracked. */
+  void track()
+  {
+    const Eigen::Isometry3d camera_in_base = puma_.nominalCameraPose(puma_.measuredJoints());
+    const cv::Mat image = takeImage();
+    if (const std::optional<Found> found = found_.take(time_))
+    {
+      if (found->h)
+      {
+        tracker_.start(*found->h, found->camera_in_base);
+      }
+    }
+    const PlaneTrack& track = tracker_.add(image, camera_in_base);
+    if (track.state == TrackingState::TRACKING)
+    {
+      last_h_ = track.homography.h;
+    }
+    else if (found_.empty())
+    {
+      const PlaneFinder::Answer answer = parts_.finder.find({ parts_.view, image, last_h_ });
+      found_.add(time_ + params_.matching_time, { answer.h, camera_in_base });
+    }
+    tracks_.add(time_ + params_.image_delay, { time_, track });
+    if (on_step_)
+    {
+      on_step_({ time_, image, cameraPose(), track, servo_.report(), sent_ });
     }
   }
-  const auto camera_pose = [&] {
-    return world_.robot_base * puma.cameraPose();
-  };
-  SimulatedCamera camera(world_, conditions.groups, params_.seed + 1);
-  camera.setLight(conditions.light);
 
-  const Eigen::Matrix3d k = withFocalLengthError(world_.camera, conditions.focal_length_error).k;
-  PlaneTracker tracker(parts_->view->grey(), world_.region, k, params_.tracker);
-  const cv::Rect& region = world_.region;
-  Servo25d servo({ k,
-                   { world_.camera.width, world_.camera.height },
-                   { region.x + 0.5 * (region.width - 1), region.y + 0.5 * (region.height - 1) } },
-                 params_.servo);
-  TwistLimiter limiter(params_.limits);
-  Every control_due(params_.control_period);
-  Every image_due(1.0 / world_.camera_rate);
-  std::deque<Pending> pending;
-  std::optional<Found> found;
-  std::optional<Eigen::Matrix3d> last_h;  // where the plane was tracked last
-  Twist sent = Twist::Zero();
-  ArmOutcome outcome;
-  std::optional<double> end;
-  std::string hindered;  // by a joint
-  double time = 0.0;
-  for (; time < params_.max_duration && (!end || time < *end + SETTLING); time += STEP)
+  void deliverTracks()
   {
-    if (!end && image_due.due(time))
+    while (const std::optional<StampedTrack> ready = tracks_.take(time_))
     {
-      const Eigen::Isometry3d camera_in_base = puma.nominalCameraPose(puma.measuredJoints());
-      cv::Mat image = camera.capture(camera_pose());
-      if (conditions.covered_from >= 0.0 && time >= conditions.covered_from && time < conditions.covered_from + COVERED)
+      const PlaneTrack& track = ready->track;
+      if (track.plane)
       {
-        image.setTo(40);
-      }
-      if (found && time >= found->ready)
-      {
-        if (found->h)
-        {
-          tracker.start(*found->h, found->camera_in_base);
-        }
-        found.reset();
-      }
-      const PlaneTrack& track = tracker.add(image, camera_in_base);
-      if (track.state == TrackingState::TRACKING)
-      {
-        last_h = track.homography.h;
-      }
-      if (track.state != TrackingState::TRACKING && !found)
-      {
-        const PlaneFinder::Answer answer = parts_->finder.find({ parts_->view, image, last_h });
-        found = Found{ time + params_.matching_time, answer.h, camera_in_base };
-      }
-      pending.push_back({ time + params_.image_delay, time, track });
-      if (on_step)
-      {
-        on_step({ time, image, camera_pose(), track, servo.report(), sent });
-      }
-    }
-    while (!pending.empty() && time >= pending.front().ready)
-    {
-      const Pending& next = pending.front();
-      if (next.track.plane)
-      {
-        servo.add(
-            { next.stamp, next.track.plane->motion, next.track.plane->distance, next.track.homography.supporting });
+        servo_.add({ ready->stamp, track.plane->motion, track.plane->distance, track.homography.supporting });
       }
       else
       {
-        servo.addLoss(next.stamp, "the view is not in the image");
+        servo_.addLoss(ready->stamp, "the view is not in the image");
       }
-      pending.pop_front();
-    }
-    if (control_due.due(time))
-    {
-      const ServoState state = servo.report().state;
-      if (!end && (state == ServoState::CONVERGED || state == ServoState::FAILED))
-      {
-        end = time;
-      }
-      const Twist wanted = end ? Twist(Twist::Zero()) : servo.command(time);
-      if (wanted.isZero())
-      {
-        limiter.stop();
-      }
-      sent = limiter.next(wanted, params_.control_period);
-      servo.sent(time, sent);
-      puma.command(sent);
-    }
-    puma.step(STEP);
-    if (!end && puma.state() == Puma::State::AT_LIMIT)
-    {
-      end = time;
-      hindered = puma.message();
-      puma.halt();
     }
   }
-  const Eigen::Isometry3d error = world_.goal.inverse() * camera_pose();
-  outcome.converged = hindered.empty() && servo.report().state == ServoState::CONVERGED;
-  outcome.reason = !hindered.empty() ? hindered
-                   : end             ? servo.report().reason
-                                     : "not there in time: " + servo.report().reason;
-  outcome.translation_error = error.translation().norm();
-  outcome.rotation_error = Eigen::AngleAxisd(error.linear()).angle();
-  outcome.duration = end ? *end : time;
-  return outcome;
+
+  void control()
+  {
+    const ServoState state = servo_.report().state;
+    if (!end_ && (state == ServoState::CONVERGED || state == ServoState::FAILED))
+    {
+      end_ = time_;
+    }
+    sent_ = limiter_.next(end_ ? Twist(Twist::Zero()) : servo_.command(time_), params_.control_period);
+    servo_.sent(time_, sent_);
+    puma_.command(sent_);
+  }
+
+  void move()
+  {
+    puma_.step(STEP);
+    if (!end_ && puma_.state() == Puma::State::AT_LIMIT)
+    {
+      end_ = time_;
+      hindrance_ = puma_.message();
+      puma_.halt();
+    }
+  }
+
+  ArmOutcome outcome() const
+  {
+    const Eigen::Isometry3d error = world_.goal.inverse() * cameraPose();
+    const ServoReport& report = servo_.report();
+    ArmOutcome outcome;
+    outcome.converged = hindrance_.empty() && report.state == ServoState::CONVERGED;
+    outcome.reason = !hindrance_.empty() ? hindrance_ : end_ ? report.reason : "not there in time: " + report.reason;
+    outcome.translation_error = error.translation().norm();
+    outcome.rotation_error = Eigen::AngleAxisd(error.linear()).angle();
+    outcome.duration = end_ ? *end_ : time_;
+    return outcome;
+  }
+
+  const World& world_;
+  const ArmTrialParams& params_;
+  Parts& parts_;
+  const std::function<void(const ArmStep&)>& on_step_;
+  Puma puma_;
+  SimulatedCamera camera_;
+  Eigen::Matrix3d k_;  // as the calibration has it
+  PlaneTracker tracker_;
+  Servo25d servo_;
+  TwistLimiter limiter_;
+  Every control_due_;
+  Every image_due_;
+  Delayed<Found> found_;  // one at most
+  Delayed<StampedTrack> tracks_;
+  std::optional<Eigen::Matrix3d> last_h_;  // where the plane was tracked last
+  Twist sent_ = Twist::Zero();
+  std::string hindrance_;      // by a joint
+  std::optional<double> end_;  // when servoing ended [s]
+  double time_ = 0.0;          // [s]
+};
+
+ArmOutcome ArmTrials::run(const Eigen::Isometry3d& start, const std::function<void(const ArmStep&)>& on_step)
+{
+  return Run(world_, urdf_xml_, params_, *parts_, on_step).run(start);
 }
 
 }  // namespace view_servo::sim

@@ -19,17 +19,17 @@
 
 namespace view_servo::sim
 {
-/** What makes servoing harder. */
+/** What makes servoing harder. The defaults add nothing. */
 struct ArmConditions
 {
-  double image_noise = -1.0;                ///< sd [grey levels]; negative: the world's
-  Light light;                              ///< while it servos; the view is stored under the world's
-  std::vector<std::string> groups;          ///< of things that were not there when the view was stored
-  double encoder_noise = 0.0;               ///< sd of each reading [rad]
-  double hand_eye_translation_error = 0.0;  ///< [m]
-  double hand_eye_rotation_error = 0.0;     ///< [rad]
-  double focal_length_error = 0.0;          ///< of the calibration, as a part of it
-  double covered_from = -1.0;               ///< when something covers the camera, for 2 s [s]; negative: nothing does
+  double image_noise = -1.0;                ///< standard deviation [grey levels]; negative: the world's
+  Light light;                              ///< while the arm servos; the view is stored under the world's light
+  std::vector<std::string> groups;          ///< of surfaces that were not there when the view was stored
+  double encoder_noise = 0.0;               ///< standard deviation of each reading [rad]
+  double hand_eye_translation_error = 0.0;  ///< of the camera's place on the hand [m]
+  double hand_eye_rotation_error = 0.0;     ///< of its direction [rad]
+  double focal_length_error = 0.0;          ///< by which part the calibration has focal lengths too long
+  double covered_from = -1.0;               ///< when something covers the camera for 2 s [s]; negative: never
 };
 
 struct ArmTrialParams
@@ -39,52 +39,55 @@ struct ArmTrialParams
   VelocityLimits limits = ARM_LIMITS;
   ArmConditions conditions;
   double control_period = 0.02;  ///< [s]
-  double image_delay = 0.05;     ///< from an image's stamp until servoing knows what it says [s]
-  double matching_time = 0.3;    ///< that passes until the view is found by its points [s]
-  double max_duration = 40.0;    ///< [s]
-  std::uint64_t seed = 1;
+  double image_delay = 0.05;     ///< from an image's stamp until servoing gets what tracking makes of it [s]
+  double matching_time = 0.3;  ///< from an image's stamp until tracking gets where the view is in it by its points [s]
+  double max_duration = 40.0;  ///< after which a run is given up [s]
+  std::uint64_t seed = 1;      ///< of all noise, and of the hand-eye error's directions
 };
 
-/** What happened with an image, for plots and checks. */
+/** The state when an image is taken, with what tracking makes of it. */
 struct ArmStep
 {
-  double time = 0.0;  ///< of the image [s]
+  double time = 0.0;  ///< since the start [s]
   cv::Mat image;
-  Eigen::Isometry3d camera;  ///< the true one, in the world
-  PlaneTrack track;
-  ServoReport report;  ///< when it was taken, as of the images before
-  Twist sent;          ///< likewise
+  Eigen::Isometry3d camera;  ///< world from the true camera
+  PlaneTrack track;          ///< with this image
+  ServoReport report;        ///< without this image, which servoing gets later
+  Twist sent;                ///< last command, in the camera's frame [m/s, rad/s]
 };
 
 struct ArmOutcome
 {
-  bool converged = false;          ///< says servoing
-  std::string reason;              ///< why it ended
-  double translation_error = 0.0;  ///< true one, at the end [m]
-  double rotation_error = 0.0;     ///< likewise [rad]
-  double duration = 0.0;           ///< [s]
+  bool converged = false;          ///< what servoing says, if no joint came to its end
+  std::string reason;              ///< why the run ended
+  double translation_error = 0.0;  ///< true distance of the camera from the goal at the end [m]
+  double rotation_error = 0.0;     ///< true angle between the two at the end [rad]
+  double duration = 0.0;           ///< until servoing ended [s]
 };
 
 /**
- * 2.5D servoing in a simulated world, in one process and as fast as it can: image, matching, tracking, servoing, limits,
- * arm, with the same classes that the nodes use and the delays that they have. The view is stored at the world's goal,
- * with the world's region of interest.
+ * Runs of 2.5D servoing in a simulated world, in one process and as fast as it can: images, matching, tracking,
+ * servoing, velocity limits and the arm, with the same classes that the nodes use and with the delays that the nodes
+ * have. The view is stored at the world's goal, with the world's region of interest.
  */
 class ArmTrials
 {
 public:
-  /** For arm worlds. @param urdf_xml of the arm. @throws what SimulatedCamera, Puma and PlaneTracker throw. */
+  /** @param world of the arm. @param urdf_xml of the arm. @throws what SimulatedCamera throws. */
   ArmTrials(const World& world, const std::string& urdf_xml, const ArmTrialParams& params);
   ~ArmTrials();
 
   /**
-   * @param start of the camera, in the world. @param on_step called for each image, may be empty.
-   * @throws std::invalid_argument when the camera cannot be brought there.
+   * @param start world from the camera's optical frame.
+   * @param on_step is called for each image; may be empty.
+   * @throws std::invalid_argument when the arm cannot bring its camera to the start or the goal, or what Puma and
+   * PlaneTracker throw.
    */
   ArmOutcome run(const Eigen::Isometry3d& start, const std::function<void(const ArmStep&)>& on_step = {});
 
 private:
   struct Parts;
+  class Run;
 
   World world_;
   std::string urdf_xml_;

@@ -3,32 +3,35 @@
 #include "trials/homing_trial.h"
 
 #include "sim/renderer.h"
-#include "trials/trial.h"
 #include "sim/visibility.h"
+#include "trials/trial.h"
 #include "view_servo/views/line_view_matcher.h"
-#include "view_servo/views/prepared_image.h"
 #include "view_servo/views/point_view_matcher.h"
+#include "view_servo/views/prepared_image.h"
 
 #include <opencv2/imgproc.hpp>
 
 #include <algorithm>
 #include <cmath>
-#include <deque>
-#include <limits>
+#include <memory>
 #include <optional>
-#include <utility>
+#include <stdexcept>
+#include <vector>
 
 namespace view_servo::sim
 {
 namespace
 {
-constexpr double STEP = 0.005;            // of the base [s]
+constexpr double STEP = 0.005;            // of the simulation [s]
 constexpr double ODOMETRY_PERIOD = 0.02;  // [s]
 constexpr double CONTROL_PERIOD = 0.05;   // [s]
-constexpr double IMAGE_DELAY = 0.05;      // from the stamp to what homing makes of it [s]
-constexpr double SETTLING = 1.0;          // after homing has ended, until the error is measured [s]
+constexpr double IMAGE_DELAY = 0.05;      // from an image's stamp until homing gets it [s]
+constexpr double SETTLING = 1.0;          // from the end of homing until the error is measured [s]
 
-/** Somebody walks by, from left to right in 2 s, 1.2 m in front of the camera. */
+/**
+ * Draws somebody who walks by from left to right in 2 s, 1.2 m in front of the camera.
+ * @param seconds since the person entered the image.
+ */
 void drawPasserBy(double seconds, const Camera& camera, double camera_height, cv::Mat& image)
 {
   constexpr double DURATION = 2.0;
@@ -58,25 +61,6 @@ void drawPasserBy(double seconds, const Camera& camera, double camera_height, cv
       image.at<unsigned char>(v, u) = static_cast<unsigned char>(60 + 45 * stripe);
     }
   }
-}
-
-struct Matches
-{
-  double stamp;
-  double ready;
-  Correspondences pairs;
-  std::vector<double> weights;
-};
-
-Matches toMatches(const ViewMatch& match, double stamp, double ready)
-{
-  Matches result{ stamp, ready, {}, {} };
-  for (const MatchedPoint& point : match.matches)
-  {
-    result.pairs.push_back(point.position);
-    result.weights.push_back(point.score);
-  }
-  return result;
 }
 
 }  // namespace
@@ -109,108 +93,208 @@ HomingTrials::HomingTrials(const World& world, const HomingTrialParams& params)
 
 HomingTrials::~HomingTrials() = default;
 
+namespace
+{
+/** What a matcher finds in an image. */
+struct StampedMatches
+{
+  double stamp;  // [s]
+  Correspondences pixels;
+  std::vector<double> weights;
+};
+
+StampedMatches toMatches(double stamp, const ViewMatch& match)
+{
+  StampedMatches result{ stamp, {}, {} };
+  for (const MatchedPoint& point : match.matches)
+  {
+    result.pixels.push_back(point.position);
+    result.weights.push_back(point.score);
+  }
+  return result;
+}
+
+struct StampedImage
+{
+  double stamp;  // [s]
+  cv::Mat image;
+};
+
+Nomad nomadAt(const World& world, const HomingTrialParams& params, const PlanarPose& start)
+{
+  NomadParams nomad_params;
+  nomad_params.odometry_drift = params.conditions.odometry_drift;
+  nomad_params.seed = params.seed;
+  Nomad nomad(world, nomad_params);
+  nomad.setPose(planarPose(start.x, start.y, start.yaw));
+  return nomad;
+}
+
+}  // namespace
+
+/** One run: what moves, what is on its way, and the steps of a cycle. */
+class HomingTrials::Run
+{
+public:
+  Run(const World& world, const HomingTrialParams& params, Parts& parts, const PlanarPose& start,
+      const std::function<void(const HomingStep&)>& on_step)
+    : world_(world),
+      params_(params),
+      parts_(parts),
+      on_step_(on_step),
+      nomad_(nomadAt(world, params, start)),
+      homing_(makeHoming(params.homing, { parts.reference->grey(),
+                                          withFocalLengthError(world.camera, params.conditions.focal_length_error),
+                                          CameraMount(world.camera_on_base) })),
+      limiter_(params.limits),
+      odometry_due_(ODOMETRY_PERIOD),
+      control_due_(CONTROL_PERIOD),
+      image_due_(1.0 / world.camera_rate),
+      points_due_(params.points_period),
+      lines_due_(params.lines_period),
+      last_(start)
+  {
+  }
+
+  HomingOutcome run()
+  {
+    for (time_ = 0.0; time_ < params_.max_duration && (!end_ || time_ < *end_ + SETTLING); time_ += STEP)
+    {
+      if (odometry_due_.due(time_))
+      {
+        homing_->addOdometry(time_, toPlanar(nomad_.odometry()));
+      }
+      if (!end_ && image_due_.due(time_))
+      {
+        const cv::Mat image = takeImage();
+        images_.add(time_ + IMAGE_DELAY, { time_, image });
+        match(image);
+      }
+      deliverImage();
+      deliverMatches();
+      if (control_due_.due(time_))
+      {
+        control();
+      }
+      move();
+    }
+    return outcome();
+  }
+
+private:
+  cv::Mat takeImage()
+  {
+    cv::Mat image = parts_.camera.capture(nomad_.cameraPose());
+    if (params_.conditions.occluded_from >= 0.0)
+    {
+      drawPasserBy(time_ - params_.conditions.occluded_from, world_.camera, world_.camera_on_base.translation().z(),
+                   image);
+    }
+    return image;
+  }
+
+  /** Begins to match the image by points, by lines, or both, when it is time for that. */
+  void match(const cv::Mat& image)
+  {
+    const bool by_points = params_.use_points && points_due_.due(time_);
+    const bool by_lines = params_.use_lines && lines_due_.due(time_);
+    if (!by_points && !by_lines)
+    {
+      return;
+    }
+    const double ready = time_ + params_.matching_time;
+    const PreparedImage current(image, cv::Rect(), parts_.features);
+    if (by_points)
+    {
+      matches_.add(ready, toMatches(time_, parts_.points.match(*parts_.reference, current, GeometryModel::HOMOGRAPHY)));
+    }
+    if (by_lines)
+    {
+      const LineGrouping groups = params_.line_pairs ? LineGrouping::PAIRS : LineGrouping::TRIPLETS;
+      matches_.add(ready,
+                   toMatches(time_, parts_.lines.match(*parts_.reference, current, GeometryModel::HOMOGRAPHY, groups)));
+    }
+  }
+
+  void deliverImage()
+  {
+    if (const std::optional<StampedImage> ready = images_.take(time_))
+    {
+      homing_->addImage(ready->stamp, ready->image);
+      if (on_step_)
+      {
+        on_step_({ time_, toPlanar(nomad_.pose()), homing_->report(), nomad_.velocity() });
+      }
+    }
+  }
+
+  void deliverMatches()
+  {
+    if (const std::optional<StampedMatches> ready = matches_.take(time_))
+    {
+      homing_->addMatches(ready->stamp, ready->pixels, ready->weights);
+    }
+  }
+
+  void control()
+  {
+    nomad_.command(limiter_.next(homing_->command(), CONTROL_PERIOD));
+    const HomingState state = homing_->report().state;
+    if (!end_ && (state == HomingState::ARRIVED || state == HomingState::FAILED))
+    {
+      end_ = time_;
+    }
+  }
+
+  void move()
+  {
+    nomad_.step(STEP);
+    const PlanarPose here = toPlanar(nomad_.pose());
+    travelled_ += std::hypot(here.x - last_.x, here.y - last_.y);
+    last_ = here;
+  }
+
+  HomingOutcome outcome() const
+  {
+    const PlanarPose error = compose(inverse(toPlanar(world_.goal)), last_);
+    HomingOutcome outcome;
+    outcome.arrived = homing_->report().state == HomingState::ARRIVED;
+    outcome.reason = end_ ? homing_->report().reason : "not arrived in time: " + homing_->report().reason;
+    outcome.distance_error = error.distance();
+    outcome.ahead_error = error.x;
+    outcome.side_error = error.y;
+    outcome.yaw_error = error.yaw;
+    outcome.duration = end_ ? *end_ : time_;
+    outcome.travelled = travelled_;
+    return outcome;
+  }
+
+  const World& world_;
+  const HomingTrialParams& params_;
+  Parts& parts_;
+  const std::function<void(const HomingStep&)>& on_step_;
+  Nomad nomad_;
+  std::unique_ptr<Homing> homing_;
+  BaseVelocityLimiter limiter_;
+  Every odometry_due_;
+  Every control_due_;
+  Every image_due_;
+  Every points_due_;
+  Every lines_due_;
+  Delayed<StampedImage> images_;
+  Delayed<StampedMatches> matches_;
+  PlanarPose last_;
+  double travelled_ = 0.0;
+  std::optional<double> end_;  // when homing ended [s]
+  double time_ = 0.0;          // [s]
+};
+
 HomingOutcome HomingTrials::run(const PlanarPose& start, const std::function<void(const HomingStep&)>& on_step)
 {
-  const HomingConditions& conditions = params_.conditions;
-  NomadParams nomad_params;
-  nomad_params.odometry_drift = conditions.odometry_drift;
-  nomad_params.seed = params_.seed;
-  Nomad nomad(world_, nomad_params);
-  nomad.setPose(planarPose(start.x, start.y, start.yaw));
   Light light = world_.light;
-  light.gain *= conditions.light_gain;
+  light.gain *= params_.conditions.light_gain;
   parts_->camera.setLight(light);
-
-  const Camera camera = withFocalLengthError(world_.camera, conditions.focal_length_error);
-  const std::unique_ptr<Homing> homing =
-      makeHoming(params_.homing, { parts_->reference->grey(), camera, CameraMount(world_.camera_on_base) });
-  BaseVelocityLimiter limiter(params_.limits);
-  Every odometry_due(ODOMETRY_PERIOD);
-  Every control_due(CONTROL_PERIOD);
-  Every image_due(1.0 / world_.camera_rate);
-  Every points_due(params_.points_period);
-  Every lines_due(params_.lines_period);
-  std::deque<std::pair<double, cv::Mat>> images;
-  std::deque<Matches> matches;
-  HomingOutcome outcome;
-  PlanarPose last = start;
-  std::optional<double> end;
-  double time = 0.0;
-  for (; time < params_.max_duration && (!end || time < *end + SETTLING); time += STEP)
-  {
-    if (odometry_due.due(time))
-    {
-      homing->addOdometry(time, toPlanar(nomad.odometry()));
-    }
-    if (!end && image_due.due(time))
-    {
-      cv::Mat image = parts_->camera.capture(nomad.cameraPose());
-      if (conditions.occluded_from >= 0.0)
-      {
-        drawPasserBy(time - conditions.occluded_from, world_.camera, world_.camera_on_base.translation().z(), image);
-      }
-      images.emplace_back(time, image);
-      const bool by_points = params_.use_points && points_due.due(time);
-      const bool by_lines = params_.use_lines && lines_due.due(time);
-      if (by_points || by_lines)
-      {
-        const PreparedImage current(image, cv::Rect(), parts_->features);
-        if (by_points)
-        {
-          matches.push_back(toMatches(parts_->points.match(*parts_->reference, current, GeometryModel::HOMOGRAPHY),
-                                      time, time + params_.matching_time));
-        }
-        if (by_lines)
-        {
-          matches.push_back(
-              toMatches(parts_->lines.match(parts_->reference->lines(), current.lines(), GeometryModel::HOMOGRAPHY,
-                                            params_.line_pairs ? LineGrouping::PAIRS : LineGrouping::TRIPLETS),
-                        time, time + params_.matching_time));
-        }
-      }
-    }
-    if (!images.empty() && time >= images.front().first + IMAGE_DELAY)
-    {
-      homing->addImage(images.front().first, images.front().second);
-      images.pop_front();
-      if (on_step)
-      {
-        on_step({ time, toPlanar(nomad.pose()), homing->report(), nomad.velocity() });
-      }
-    }
-    if (!matches.empty() && time >= matches.front().ready)
-    {
-      homing->addMatches(matches.front().stamp, matches.front().pairs, matches.front().weights);
-      matches.pop_front();
-    }
-    if (control_due.due(time))
-    {
-      const BaseVelocity wanted = homing->command();
-      if (wanted.isZero())
-      {
-        limiter.stop();
-      }
-      nomad.command(limiter.next(wanted, CONTROL_PERIOD));
-      const HomingState state = homing->report().state;
-      if (!end && (state == HomingState::ARRIVED || state == HomingState::FAILED))
-      {
-        end = time;
-      }
-    }
-    nomad.step(STEP);
-    const PlanarPose here = toPlanar(nomad.pose());
-    outcome.travelled += std::hypot(here.x - last.x, here.y - last.y);
-    last = here;
-  }
-  const PlanarPose error = compose(inverse(toPlanar(world_.goal)), last);
-  outcome.arrived = homing->report().state == HomingState::ARRIVED;
-  outcome.reason = end ? homing->report().reason : "not arrived in time: " + homing->report().reason;
-  outcome.distance_error = error.distance();
-  outcome.ahead_error = error.x;
-  outcome.side_error = error.y;
-  outcome.yaw_error = error.yaw;
-  outcome.duration = end ? *end : time;
-  return outcome;
+  return Run(world_, params_, *parts_, start, on_step).run();
 }
 
 PlanarPose randomStart(const World& world, Rng& rng)

@@ -6,7 +6,7 @@
 #include "sim/world.h"
 #include "view_servo/control/homing.h"
 #include "view_servo/control/velocity_limiter.h"
-#include "view_servo/geometry/planar_motion.h"
+#include "view_servo/geometry/planar_pose.h"
 
 #include <cstdint>
 #include <functional>
@@ -16,14 +16,14 @@
 
 namespace view_servo::sim
 {
-/** What makes homing harder. */
+/** What makes homing harder. The defaults add nothing. */
 struct HomingConditions
 {
-  double image_noise = -1.0;        ///< sd [grey levels]; negative: the world's
-  double odometry_drift = 0.0;      ///< distance measured too long, as a part of it
-  double light_gain = 1.0;          ///< against that of the stored view
-  double focal_length_error = 0.0;  ///< of the calibration, as a part of it
-  double occluded_from = -1.0;      ///< when a person begins to walk by, for 2 s [s]; negative: nobody does
+  double image_noise = -1.0;        ///< standard deviation [grey levels]; negative: the world's
+  double odometry_drift = 0.0;      ///< by which part distances are measured too long
+  double light_gain = 1.0;          ///< factor of the light under which the view was stored
+  double focal_length_error = 0.0;  ///< by which part the calibration has focal lengths too long
+  double occluded_from = -1.0;      ///< when a person begins to walk by, which takes 2 s [s]; negative: never
 };
 
 struct HomingTrialParams
@@ -33,59 +33,67 @@ struct HomingTrialParams
   HomingConditions conditions;
   bool use_points = true;
   bool use_lines = true;
-  bool line_pairs = false;      ///< instead of triplets
+  bool line_pairs = false;      ///< groups of lines are pairs instead of triplets
   double points_period = 0.5;   ///< between two images that are matched by points [s], > 0
-  double lines_period = 1.0;    ///< likewise, by lines
-  double matching_time = 0.15;  ///< that passes until matches are there [s]
-  double max_duration = 120.0;  ///< [s]
-  std::uint64_t seed = 1;
+  double lines_period = 1.0;    ///< between two images that are matched by lines [s], > 0
+  double matching_time = 0.15;  ///< from an image's stamp until homing gets its matches [s]
+  double max_duration = 120.0;  ///< after which a run is given up [s]
+  std::uint64_t seed = 1;       ///< of the noise of images and odometry
 };
 
-/** One cycle of a trial, for plots. */
+/** The state when homing gets an image. */
 struct HomingStep
 {
-  double time = 0.0;
-  PlanarPose base;  ///< in the world
-  HomingReport report;
-  BaseVelocity velocity;
+  double time = 0.0;      ///< since the start [s]
+  PlanarPose base;        ///< the true one, in the world
+  HomingReport report;    ///< with what homing makes of the image
+  BaseVelocity velocity;  ///< the true one, in the base's frame [m/s, rad/s]
 };
 
 struct HomingOutcome
 {
-  bool arrived = false;         ///< says homing
-  std::string reason;           ///< why it ended
-  double distance_error = 0.0;  ///< true one, at the end [m]
-  double ahead_error = 0.0;     ///< of this, past (+) or before (-) the goal along its x axis [m]
-  double side_error = 0.0;      ///< to its left (+) or right (-) [m]
-  double yaw_error = 0.0;       ///< true one [rad]
-  double duration = 0.0;        ///< [s]
-  double travelled = 0.0;       ///< [m]
+  bool arrived = false;         ///< what homing says
+  std::string reason;           ///< why homing ended
+  double distance_error = 0.0;  ///< true distance from the goal at the end [m]
+  double ahead_error = 0.0;     ///< its part along the goal's x axis: past (+) or before (-) the goal [m]
+  double side_error = 0.0;      ///< its part across: to the goal's left (+) or right (-) [m]
+  double yaw_error = 0.0;       ///< true one, at the end [rad]
+  double duration = 0.0;        ///< until homing ended [s]
+  double travelled = 0.0;       ///< length of the true path [m]
 };
 
 /**
- * Homing in a simulated world, in one process and as fast as it can: image, matching, homing, limits, base, with the
- * same classes that the nodes use and the delays that they have. The view is stored at the world's goal.
+ * Runs of homing in a simulated world, in one process and as fast as it can: images, matching, homing, velocity limits
+ * and the base, with the same classes that the nodes use and with the delays that the nodes have. The view is stored at
+ * the world's goal.
  */
 class HomingTrials
 {
 public:
-  /** For base worlds. Matches with the default parameters. @throws what SimulatedCamera throws. */
+  /** @param world of the base. Matchers have their default parameters. @throws what SimulatedCamera throws. */
   HomingTrials(const World& world, const HomingTrialParams& params);
   ~HomingTrials();
 
-  /** @param on_step called after each image, may be empty. @throws std::invalid_argument when the start is no place. */
+  /**
+   * @param start of the base, in the world.
+   * @param on_step is called for each image, after homing got it; may be empty.
+   * @throws std::invalid_argument naming faults of the parameters, or what stands at the start.
+   */
   HomingOutcome run(const PlanarPose& start, const std::function<void(const HomingStep&)>& on_step = {});
 
 private:
   struct Parts;
+  class Run;
+
   World world_;
   HomingTrialParams params_;
   std::unique_ptr<Parts> parts_;
 };
 
 /**
- * A random start: `distance` from the goal, in any direction within +-60 degrees behind or in front of it, yaw off by up
- * to 10 degrees, where the base can stand and at least 30 % of the stored view is in sight.
+ * A random start in the world: 0.4 to 2 m behind or in front of the goal, in a direction within 60 degrees of the
+ * goal's axis, with the yaw off by up to 10 degrees, where the base can stand and at least 30 % of the stored view is
+ * in sight.
  */
 PlanarPose randomStart(const World& world, Rng& rng);
 

@@ -2,23 +2,26 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-#include "sim/world.h"
+#include <deque>
+#include <optional>
+#include <utility>
 
 namespace view_servo::sim
 {
 /** @file
- * What trials of several robots share.
+ * What the trials of both robots need to keep the times of a real driver in simulated time [s].
  */
 
-/** True at each multiple of a period. */
+/** Something that happens at time 0 and then once a period. */
 class Every
 {
 public:
-  /** @param period [s]. */
+  /** @param period [s], > 0. */
   explicit Every(double period) : period_(period)
   {
   }
 
+  /** Whether it is time for it; each time is asked for at most once, and times increase. */
   bool due(double time)
   {
     if (time < next_ - 1e-9)
@@ -34,24 +37,36 @@ private:
   double next_ = 0.0;
 };
 
-/** @param error by which the calibration has the focal lengths too long, as a part of them. */
-inline Camera withFocalLengthError(Camera camera, double error)
+/** Values that are ready some time after they were begun, and are taken in the order in which they were begun. */
+template <typename Value>
+class Delayed
 {
-  camera.k(0, 0) *= 1.0 + error;
-  camera.k(1, 1) *= 1.0 + error;
-  camera.projection(0, 0) *= 1.0 + error;
-  camera.projection(1, 1) *= 1.0 + error;
-  return camera;
-}
-
-/** @param noise sd [grey levels]; negative: the world's. */
-inline World withImageNoise(World world, double noise)
-{
-  if (noise >= 0.0)
+public:
+  /** @param ready when the value may be taken. */
+  void add(double ready, Value value)
   {
-    world.quality.noise = noise;
+    waiting_.emplace_back(ready, std::move(value));
   }
-  return world;
-}
+
+  /** Takes the oldest value, if it is ready. */
+  std::optional<Value> take(double time)
+  {
+    if (waiting_.empty() || time < waiting_.front().first)
+    {
+      return std::nullopt;
+    }
+    std::optional<Value> value(std::move(waiting_.front().second));
+    waiting_.pop_front();
+    return value;
+  }
+
+  bool empty() const
+  {
+    return waiting_.empty();
+  }
+
+private:
+  std::deque<std::pair<double, Value>> waiting_;
+};
 
 }  // namespace view_servo::sim

@@ -4,10 +4,10 @@
 
 #include "stage_clock.h"
 #include "view_servo/features/side_correlation.h"
-#include "view_servo/parameters/faults.h"
 #include "view_servo/geometry/fundamental.h"
 #include "view_servo/geometry/homography.h"
 #include "view_servo/geometry/line_homography.h"
+#include "view_servo/parameters/faults.h"
 #include "view_servo/robust/fundamental_estimator.h"
 #include "view_servo/robust/line_homography_estimator.h"
 
@@ -21,7 +21,6 @@
 #include <cstddef>
 #include <limits>
 #include <optional>
-#include <stdexcept>
 #include <utility>
 
 namespace view_servo
@@ -31,7 +30,6 @@ namespace
 constexpr double NOT_A_NUMBER = std::numeric_limits<double>::quiet_NaN();
 /** Support that the best region must have: of 128 pairs of unrelated images none had one of more than 5.6. */
 constexpr double BEYOND_CHANCE = 7.0;
-constexpr double HUBER_WIDTH = 0.5;  // of the final fits: residuals beyond count linearly [px]
 
 /** How sure a match is: the mean of what the segments share and of how alike their surroundings look. */
 double quality(const SegmentMatch& match)
@@ -278,7 +276,7 @@ private:
       return std::nullopt;
     }
     RansacParams ransac_params = params_.ransac;
-    ransac_params.inlier_threshold = params_.plane_threshold;
+    ransac_params.inlier_threshold = params_.planes.threshold;
     ransac_params.sampling = Sampling::UNIFORM;
     ransac_params.max_iterations = std::min(ransac_params.max_iterations, MAX_ITERATIONS);
     Rng rng(params_.seed);
@@ -330,119 +328,12 @@ private:
   std::vector<LineRegion> regions_;
 };
 
-/** Homographies of planes, by RANSAC on what the former ones left (thesis 4.7.1), and which of them each line is on. */
-struct Planes
-{
-  std::vector<Eigen::Matrix3d> homographies;
-  std::vector<int> of_line;
-};
-
-Planes findPlanes(const SegmentPairs& lines, const LineMatcherParams& params, Rng& rng)
-{
-  Planes planes{ {}, std::vector<int>(lines.size(), -1) };
-  RansacParams ransac_params = params.ransac;
-  ransac_params.inlier_threshold = params.plane_threshold;
-  ransac_params.sampling = Sampling::UNIFORM;
-  ransac_params.max_iterations = std::min(ransac_params.max_iterations, 500);  // enough for a third of the lines
-  std::vector<int> left(lines.size());
-  for (std::size_t i = 0; i < lines.size(); ++i)
-  {
-    left[i] = static_cast<int>(i);
-  }
-  while (static_cast<int>(planes.homographies.size()) < params.max_planes &&
-         static_cast<int>(left.size()) >= params.min_plane_lines)
-  {
-    SegmentPairs remaining;
-    for (const int i : left)
-    {
-      remaining.push_back(lines[static_cast<std::size_t>(i)]);
-    }
-    const auto found = ransac(LineHomographyEstimator(remaining), ransac_params, rng);
-    if (!found.model || static_cast<int>(found.inliers.size()) < params.min_plane_lines)
-    {
-      break;
-    }
-    for (const int i : found.inliers)
-    {
-      planes.of_line[static_cast<std::size_t>(left[static_cast<std::size_t>(i)])] =
-          static_cast<int>(planes.homographies.size());
-    }
-    planes.homographies.push_back(found.model->h);
-    left.erase(std::remove_if(left.begin(), left.end(),
-                              [&](int i) { return planes.of_line[static_cast<std::size_t>(i)] >= 0; }),
-               left.end());
-  }
-  return planes;
-}
-
-bool liesOnPlane(const Planes& planes, const Correspondence& point, double threshold)
-{
-  return std::any_of(planes.homographies.begin(), planes.homographies.end(), [&](const Eigen::Matrix3d& h) {
-    return 0.5 * symmetricTransferError(h, h.inverse(), point) <= threshold * threshold;
-  });
-}
-
-/** Whether nearly all of the points lie on one plane, which leaves F open. */
-bool isPlanar(const Correspondences& points, const Planes& planes, double threshold)
-{
-  constexpr std::size_t MIN_OFF_PLANE = 6;
-  return std::any_of(planes.homographies.begin(), planes.homographies.end(), [&](const Eigen::Matrix3d& h) {
-    const Eigen::Matrix3d inverse = h.inverse();
-    const auto off = std::count_if(points.begin(), points.end(), [&](const Correspondence& point) {
-      return 0.5 * symmetricTransferError(h, inverse, point) > threshold * threshold;
-    });
-    return static_cast<std::size_t>(off) < std::max(MIN_OFF_PLANE, points.size() / 20);
-  });
-}
-
-/** From the intersections; empty when they are too few or leave it open. */
-std::optional<Eigen::Matrix3d> fundamentalOfPoints(const Correspondences& points, const Planes& planes,
-                                                   const RansacParams& params, Rng& rng)
-{
-  constexpr std::size_t MIN_POINTS = 12;
-  if (points.size() < MIN_POINTS || isPlanar(points, planes, params.inlier_threshold))
-  {
-    return std::nullopt;
-  }
-  RansacParams ransac_params = params;
-  ransac_params.sampling = Sampling::UNIFORM;
-  const auto found = ransac(FundamentalEstimator(points, 0.0), ransac_params, rng);
-  if (!found.model || found.inliers.size() < MIN_POINTS)
-  {
-    return std::nullopt;
-  }
-  return refineFundamental(*found.model, select(points, found.inliers), HUBER_WIDTH);
-}
-
-/** From two planes: the points of their lines, each where its plane's homography sends it (thesis 4.7). */
-std::optional<Eigen::Matrix3d> fundamentalOfPlanes(const SegmentPairs& lines, const Planes& planes)
-{
-  if (planes.homographies.size() < 2)
-  {
-    return std::nullopt;
-  }
-  Correspondences sent;
-  for (std::size_t i = 0; i < lines.size(); ++i)
-  {
-    if (planes.of_line[i] == 0 || planes.of_line[i] == 1)
-    {
-      const Eigen::Matrix3d& h = planes.homographies[static_cast<std::size_t>(planes.of_line[i])];
-      for (const Eigen::Vector2d& end : { lines[i].reference.start, lines[i].reference.end })
-      {
-        sent.push_back({ end, transfer(h, end) });
-      }
-    }
-  }
-  const auto linear = fundamentalFromPoints(sent);
-  return linear ? std::optional<Eigen::Matrix3d>(refineFundamental(*linear, sent, HUBER_WIDTH)) : std::nullopt;
-}
-
 std::string plural(std::size_t count, const std::string& noun)
 {
   return std::to_string(count) + " " + noun + (count == 1 ? "" : "s");
 }
 
-void reportPlane(const SegmentPairs& lines, const Planes& planes, ViewMatch& result)
+void reportPlane(const SegmentPairs& lines, const LinePlanes& planes, ViewMatch& result)
 {
   const LineHomographyEstimator estimator(lines);
   const LineHomographyEstimator::Model model{ planes.homographies.front(), planes.homographies.front().inverse() };
@@ -499,6 +390,15 @@ std::string whyNot(const LineFeatures& reference, const LineFeatures& current, c
          " open";
 }
 
+/** The parameters that no stage of line matching has by itself. */
+std::vector<Parameter> rowsOfLines(LineMatcherParams& params)
+{
+  return {
+    real("min_quality", params.min_quality, "", "[0, 1)", "least mean of a match's overlap and correlation"),
+    natural("seed", params.seed, "of all random draws"),
+  };
+}
+
 }  // namespace
 
 LineMatcherParams::LineMatcherParams()
@@ -507,36 +407,43 @@ LineMatcherParams::LineMatcherParams()
   ransac.inlier_threshold = 3.0;
 }
 
+std::vector<Parameter> parameters(LineMatcherParams& params)
+{
+  return joined({ parameters(params.segments), parameters(params.features), parameters(params.regions),
+                  parameters(params.planes), rowsOfLines(params), parameters(params.ransac) });
+}
+
 std::vector<std::string> LineMatcherParams::validate() const
 {
-  std::vector<std::string> faults;
-  for (const std::vector<std::string>& more :
-       { segments.validate(), features.validate(), regions.validate(), ransac.validate() })
-  {
-    faults.insert(faults.end(), more.begin(), more.end());
-  }
-  if (!(plane_threshold > 0.0))
-  {
-    faults.emplace_back("plane_threshold must be more than 0 px");
-  }
-  if (min_plane_lines < 5)
-  {
-    faults.emplace_back("min_plane_lines must be at least 5");
-  }
-  if (max_planes < 1)
-  {
-    faults.emplace_back("max_planes must be at least 1");
-  }
-  if (!(min_quality >= 0.0 && min_quality < 1.0))
-  {
-    faults.emplace_back("min_quality must lie in [0, 1)");
-  }
-  return faults;
+  LineMatcherParams copy = *this;
+  Faults faults;
+  faults.add(segments.validate());
+  faults.add(features.validate());
+  faults.add(regions.validate());
+  faults.add(planes.validate());
+  faults.add(faultsOf(rowsOfLines(copy)));
+  faults.add(ransac.validate());
+  return faults.list();
 }
 
 LineViewMatcher::LineViewMatcher(const LineMatcherParams& params) : params_(params)
 {
   requireNoFaults("line matching parameters", params.validate());
+}
+
+ViewMatch LineViewMatcher::match(const PreparedImage& reference, const PreparedImage& current, GeometryModel model,
+                                 LineGrouping groups) const
+{
+  std::vector<StageTime> stages;
+  StageClock clock(stages);
+  reference.lines();
+  clock.finish("reference");
+  current.lines();
+  clock.finish("current");
+  ViewMatch result = match(reference.lines(), current.lines(), model, groups);
+  result.stages.insert(result.stages.begin(), stages.begin(), stages.end());
+  result.elapsed_ms = clock.total();
+  return result;
 }
 
 ViewMatch LineViewMatcher::match(const LineFeatures& reference, const LineFeatures& current, GeometryModel model,
@@ -570,7 +477,7 @@ ViewMatch LineViewMatcher::match(const LineFeatures& reference, const LineFeatur
   {
     lines.push_back({ reference.segment(match.reference), current.segment(match.current) });
   }
-  const Planes planes = findPlanes(lines, params_, attempt.rng());
+  const LinePlanes planes = findPlanes(lines, params_.planes, params_.ransac, attempt.rng());
   for (std::size_t i = 0; i < lines.size(); ++i)
   {
     result.lines.push_back({ lines[i].reference, lines[i].current, reference.input(matches[i].reference),

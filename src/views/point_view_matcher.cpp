@@ -2,21 +2,18 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "view_servo/views/point_view_matcher.h"
 
+#include "pair_geometry.h"
 #include "stage_clock.h"
 #include "view_servo/parameters/faults.h"
-#include "view_servo/geometry/fundamental.h"
-#include "view_servo/geometry/homography.h"
-#include "view_servo/robust/fundamental_estimator.h"
-#include "view_servo/robust/homography_estimator.h"
 #include "view_servo/robust/significance.h"
 
 #include <Eigen/Geometry>
 #include <Eigen/LU>
 
 #include <algorithm>
-#include <chrono>
 #include <cmath>
 #include <limits>
+#include <memory>
 #include <optional>
 #include <stdexcept>
 #include <utility>
@@ -28,7 +25,6 @@ namespace
 constexpr double NOT_A_NUMBER = std::numeric_limits<double>::quiet_NaN();
 constexpr std::size_t MIN_CORNERS = 8;
 constexpr int MAX_GUIDED_ROUNDS = 6;
-constexpr double HUBER_WIDTH = 0.5;  // of the final fits: residuals beyond count linearly [px]
 
 /** Which levels of reference and current image are compared. */
 struct LevelPair
@@ -39,8 +35,8 @@ struct LevelPair
 // After the full images: both blurred (2, 2), the current one smaller by 2 (2, 0), larger by 2 (0, 2), and so on.
 constexpr LevelPair OTHER_SCALES[] = { { 2, 2 }, { 2, 0 }, { 0, 2 }, { 4, 4 }, { 3, 0 }, { 0, 3 }, { 4, 0 }, { 0, 4 } };
 
-/** One comparison. */
-struct Trial
+/** One comparison of two levels. */
+struct LevelTrial
 {
   LevelPair levels;
   double share;             ///< of the profiles that are searched for
@@ -51,10 +47,10 @@ struct Trial
 // of the profiles may find a better one.
 constexpr double BEYOND_DOUBT = 10.0;  // times the significance asked for
 
-std::vector<Trial> trials(const PointViewMatcherParams& params)
+std::vector<LevelTrial> levelTrials(const PointViewMatcherParams& params)
 {
   const double all = params.points.search.share;
-  std::vector<Trial> result;
+  std::vector<LevelTrial> result;
   if (params.first_share < all)
   {
     result.push_back({ { 0, 0 }, params.first_share, BEYOND_DOUBT * params.min_log_significance });
@@ -69,125 +65,6 @@ std::vector<Trial> trials(const PointViewMatcherParams& params)
   }
   return result;
 }
-
-struct Fit
-{
-  Eigen::Matrix3d matrix;
-  std::vector<Association> inliers;
-};
-
-/** What differs between the two models. Errors are squared, as in robust/. */
-class Geometry
-{
-public:
-  Geometry(GeometryModel model, const PointViewMatcherParams& params, double threshold)
-    : model_(model), params_(params), threshold_(threshold)
-  {
-  }
-
-  /** Robust fit to one-to-one candidates between two lists of points; empty when no sample gave one. */
-  std::optional<Fit> estimate(const std::vector<Association>& candidates, const Correspondences& pairs,
-                              RansacStatistics& statistics, Rng& rng) const
-  {
-    const RansacParams ransac_params = ransacParams();
-    const auto to_fit = [&](const Eigen::Matrix3d& matrix, const std::vector<int>& inliers) {
-      Fit fit{ matrix, {} };
-      for (const int i : inliers)
-      {
-        fit.inliers.push_back(candidates[static_cast<std::size_t>(i)]);
-      }
-      return fit;
-    };
-    if (model_ == GeometryModel::HOMOGRAPHY)
-    {
-      const auto result = ransac(HomographyEstimator(pairs), ransac_params, rng);
-      statistics = result.statistics;
-      return result.model ? std::optional<Fit>(to_fit(result.model->h, result.inliers)) : std::nullopt;
-    }
-    const auto result = ransac(FundamentalEstimator(pairs, viewThreshold()), ransac_params, rng);
-    statistics = result.statistics;
-    return result.model ? std::optional<Fit>(to_fit(*result.model, result.inliers)) : std::nullopt;
-  }
-
-  /** The same from all associations (thesis ch. 9). */
-  std::optional<Fit> estimate(const AssociationMatrix& association, const Points& reference, const Points& current,
-                              RansacStatistics& statistics, Rng& rng) const
-  {
-    MultiHypothesisParams hypotheses = params_.hypotheses;
-    hypotheses.sampling = params_.estimator == GeometryEstimator::IMPORTANCE ? HypothesisSampling::IMPORTANCE
-                                                                             : HypothesisSampling::CANDIDATES;
-    if (model_ == GeometryModel::HOMOGRAPHY)
-    {
-      auto result = estimateHomography(association, reference, current, ransacParams(), hypotheses, rng);
-      statistics = result.statistics;
-      return result.model ? std::optional<Fit>({ result.model->h, std::move(result.matches) }) : std::nullopt;
-    }
-    auto result =
-        estimateFundamental(association, reference, current, ransacParams(), hypotheses, rng, viewThreshold());
-    statistics = result.statistics;
-    return result.model ? std::optional<Fit>({ *result.model, std::move(result.matches) }) : std::nullopt;
-  }
-
-  /** Probability that a match made by chance, anywhere in the image, agrees with a model. */
-  double chance(const cv::Size& current) const
-  {
-    const double area = static_cast<double>(current.area());
-    const double diagonal = std::hypot(current.width, current.height);
-    const double agreeing =
-        model_ == GeometryModel::HOMOGRAPHY ? M_PI * threshold_ * threshold_ : 2.0 * threshold_ * diagonal;
-    return std::min(1.0, agreeing / area);
-  }
-
-  bool isHomography() const
-  {
-    return model_ == GeometryModel::HOMOGRAPHY;
-  }
-
-  double threshold() const
-  {
-    return threshold_;
-  }
-
-  int sampleSize() const
-  {
-    return model_ == GeometryModel::HOMOGRAPHY ? HomographyEstimator::SAMPLE_SIZE : FundamentalEstimator::SAMPLE_SIZE;
-  }
-
-  double squaredError(const Eigen::Matrix3d& matrix, const Correspondence& pair) const
-  {
-    return model_ == GeometryModel::HOMOGRAPHY ? 0.5 * symmetricTransferError(matrix, matrix.inverse(), pair)
-                                               : sampsonError(matrix, pair);
-  }
-
-  bool agrees(const Eigen::Matrix3d& matrix, const Correspondence& pair) const
-  {
-    return squaredError(matrix, pair) <= threshold_ * threshold_;
-  }
-
-  Eigen::Matrix3d refine(const Eigen::Matrix3d& matrix, const Correspondences& pairs) const
-  {
-    return model_ == GeometryModel::HOMOGRAPHY ? refineHomography(matrix, pairs, HUBER_WIDTH)
-                                               : refineFundamental(matrix, pairs, HUBER_WIDTH);
-  }
-
-private:
-  RansacParams ransacParams() const
-  {
-    RansacParams ransac_params = params_.ransac;
-    ransac_params.inlier_threshold = threshold_;
-    return ransac_params;
-  }
-
-  /** Of the samples for F. */
-  double viewThreshold() const
-  {
-    return params_.view_consistency == ViewConsistency::WITHIN ? params_.consistency.threshold : 0.0;
-  }
-
-  GeometryModel model_;
-  const PointViewMatcherParams& params_;
-  double threshold_;
-};
 
 /**
  * Whether the matches keep the sense of rotation of neighbouring points. In a mirrored image (a plane seen from behind)
@@ -229,14 +106,6 @@ bool keepsOrientation(const Correspondences& pairs)
   return kept > reversed;
 }
 
-/** A reference corner and where it is in the current image, in the pixels of their levels. */
-struct Match
-{
-  int row;
-  Eigen::Vector2d current;
-  double score;
-};
-
 Points positions(const std::vector<Corner>& corners)
 {
   Points result;
@@ -264,8 +133,8 @@ std::vector<T> chosen(const std::vector<T>& values, const std::vector<int>& indi
 class Attempt
 {
 public:
-  Attempt(const PreparedImage& reference, const PreparedImage& current, const Trial& trial, const Geometry& geometry,
-          const PointViewMatcherParams& params)
+  Attempt(const PreparedImage& reference, const PreparedImage& current, const LevelTrial& trial,
+          const PairGeometry& geometry, const PointViewMatcherParams& params)
     : reference_(reference),
       current_(current),
       levels_(trial.levels),
@@ -273,7 +142,13 @@ public:
       geometry_(geometry),
       params_(params),
       from_(reference.points(levels_.reference)),
-      to_(current.points(levels_.current))
+      to_(current.points(levels_.current)),
+      level_{ reference.image(levels_.reference),
+              current.image(levels_.current),
+              from_.corners,
+              to_.corners,
+              association_,
+              candidates_ }
   {
     params_.points.search.share = trial.share;
   }
@@ -292,8 +167,8 @@ public:
     Correspondences pairs;
     for (const Association& candidate : candidates)
     {
-      candidates_.push_back(toMatch(candidate));
-      pairs.push_back(correspondence(candidates_.back()));
+      candidates_.push_back(level_.toMatch(candidate));
+      pairs.push_back(level_.correspondence(candidates_.back()));
     }
     clock.finish("assignment");
     if (params_.view_consistency == ViewConsistency::BEFORE)
@@ -306,9 +181,10 @@ public:
     }
 
     const bool one_hypothesis = params_.estimator == GeometryEstimator::RANSAC;
-    const std::optional<Fit> fit = one_hypothesis ? geometry_.estimate(candidates, pairs, result.ransac, rng)
-                                                  : geometry_.estimate(association_, positions(from_.corners),
-                                                                       positions(to_.corners), result.ransac, rng);
+    const std::optional<PairFit> fit = one_hypothesis
+                                           ? geometry_.fitCandidates(candidates, pairs, result.ransac, rng)
+                                           : geometry_.fitAssociation(association_, positions(from_.corners),
+                                                                      positions(to_.corners), result.ransac, rng);
     clock.finish("ransac");
     result.log_significance = 0.0;
     if (!fit)
@@ -318,8 +194,8 @@ public:
     Correspondences supporting;
     for (const Association& match : fit->inliers)
     {
-      inliers_.push_back(toMatch(match));
-      supporting.push_back(correspondence(inliers_.back()));
+      inliers_.push_back(level_.toMatch(match));
+      supporting.push_back(level_.correspondence(inliers_.back()));
     }
     const double among = chanceAmong(supporting.size(), [&](std::size_t reference, std::size_t current) {
       return geometry_.agrees(fit->matrix, { supporting[reference].reference, supporting[current].current });
@@ -344,17 +220,17 @@ public:
   {
     for (int round = 0; round < MAX_GUIDED_ROUNDS; ++round)
     {
-      const std::vector<Match> found = geometry_.isHomography() ? alongHomography() : alongFundamental();
+      const std::vector<CornerMatch> found = geometry_.findAlong(matrix_, level_);
       Correspondences supporting;
-      for (const Match& match : found)
+      for (const CornerMatch& match : found)
       {
-        supporting.push_back(correspondence(match));
+        supporting.push_back(level_.correspondence(match));
       }
       const Eigen::Matrix3d refined = geometry_.refine(matrix_, supporting);
-      std::vector<Match> agreeing;
-      for (const Match& match : found)
+      std::vector<CornerMatch> agreeing;
+      for (const CornerMatch& match : found)
       {
-        if (geometry_.agrees(refined, correspondence(match)))
+        if (geometry_.agrees(refined, level_.correspondence(match)))
         {
           agreeing.push_back(match);
         }
@@ -374,8 +250,8 @@ public:
   {
     const Eigen::Matrix3d reference_map = reference_.toFull(levels_.reference);
     const Eigen::Matrix3d current_map = current_.toFull(levels_.current);
-    const auto add = [&](const Match& match, bool inlier) {
-      const Correspondence pair = correspondence(match);
+    const auto add = [&](const CornerMatch& match, bool inlier) {
+      const Correspondence pair = level_.correspondence(match);
       result.matches.push_back({ { (reference_map * pair.reference.homogeneous()).hnormalized(),
                                    (current_map * pair.current.homogeneous()).hnormalized() },
                                  match.score,
@@ -383,12 +259,12 @@ public:
     };
     result.matches.clear();
     std::vector<char> used(from_.corners.size(), 0);
-    for (const Match& match : inliers_)
+    for (const CornerMatch& match : inliers_)
     {
       used[static_cast<std::size_t>(match.row)] = 1;
       add(match, true);
     }
-    for (const Match& candidate : candidates_)
+    for (const CornerMatch& candidate : candidates_)
     {
       if (used[static_cast<std::size_t>(candidate.row)] == 0)
       {
@@ -402,108 +278,81 @@ public:
       return;
     }
     double squares = 0.0;
-    for (const Match& match : inliers_)
+    for (const CornerMatch& match : inliers_)
     {
-      squares += geometry_.squaredError(matrix_, correspondence(match));
+      squares += geometry_.squaredError(matrix_, level_.correspondence(match));
     }
     result.outcome = MatchOutcome::MATCHED;
     result.inliers = static_cast<int>(inliers_.size());
     result.rms_error = std::sqrt(squares / static_cast<double>(inliers_.size()));
-    result.matrix =
-        geometry_.isHomography()
-            ? normalizedHomography(current_map * matrix_ * reference_map.inverse())
-            : Eigen::Matrix3d((current_map.inverse().transpose() * matrix_ * reference_map.inverse()).normalized());
+    result.matrix = geometry_.ofFullImages(matrix_, reference_map, current_map);
     result.reference_level = levels_.reference;
     result.current_level = levels_.current;
   }
 
 private:
-  Match toMatch(const Association& association) const
-  {
-    return { association.row, to_.corners[static_cast<std::size_t>(association.column)].position, association.weight };
-  }
-
-  Correspondence correspondence(const Match& match) const
-  {
-    return { from_.corners[static_cast<std::size_t>(match.row)].position, match.current };
-  }
-
-  std::vector<Match> alongHomography() const
-  {
-    // Candidates that agree, ...
-    std::vector<std::optional<Match>> of_row(from_.corners.size());
-    for (const Match& candidate : candidates_)
-    {
-      if (geometry_.agrees(matrix_, correspondence(candidate)))
-      {
-        of_row[static_cast<std::size_t>(candidate.row)] = candidate;
-      }
-    }
-    // ... with the more exact position of their patch where there is one, and what only the patches find.
-    for (const GuidedMatch& match :
-         searchAlongHomography(reference_.image(levels_.reference), from_.corners, current_.image(levels_.current),
-                               matrix_, geometry_.threshold(), params_.guidance))
-    {
-      std::optional<Match>& known = of_row[static_cast<std::size_t>(match.reference)];
-      known = Match{ match.reference, match.current, known ? known->score : 0.0 };
-    }
-    std::vector<Match> matches;
-    for (const std::optional<Match>& match : of_row)
-    {
-      if (match)
-      {
-        matches.push_back(*match);
-      }
-    }
-    return matches;
-  }
-
-  std::vector<Match> alongFundamental() const
-  {
-    std::vector<Match> matches;
-    for (const Association& match : maximumWeightMatching(
-             associateAlongFundamental(association_, from_.corners, to_.corners, matrix_, geometry_.threshold())))
-    {
-      matches.push_back(toMatch({ match.row, match.column, association_.weight(match.row, match.column) }));
-    }
-    return matches;
-  }
-
   const PreparedImage& reference_;
   const PreparedImage& current_;
   const LevelPair levels_;
   const double min_significance_;
-  const Geometry& geometry_;
+  const PairGeometry& geometry_;
   PointViewMatcherParams params_;
   const PointFeatures& from_;
   const PointFeatures& to_;
   AssociationMatrix association_;
-  std::vector<Match> candidates_;
-  std::vector<Match> inliers_;
+  std::vector<CornerMatch> candidates_;
+  const LevelData level_;
+  std::vector<CornerMatch> inliers_;
   Eigen::Matrix3d matrix_;
 };
 
 }  // namespace
 
+std::vector<Parameter> parameters(PointViewMatcherParams& params)
+{
+  return joined({
+      parameters(params.points),
+      {
+          choice<Sampling>("sampling", params.ransac.sampling,
+                           { { "uniform", Sampling::UNIFORM }, { "progressive", Sampling::PROGRESSIVE } },
+                           "draw all candidates alike, or the best first (PROSAC)"),
+          choice<GeometryEstimator>("estimator", params.estimator,
+                                    { { "ransac", GeometryEstimator::RANSAC },
+                                      { "multi_hypothesis", GeometryEstimator::MULTI_HYPOTHESIS },
+                                      { "importance", GeometryEstimator::IMPORTANCE } },
+                                    "one candidate a point, or support from all associations (and samples, too)"),
+      },
+      parameters(params.hypotheses),
+      {
+          choice<ViewConsistency>("view_consistency", params.view_consistency,
+                                  { { "off", ViewConsistency::OFF },
+                                    { "before", ViewConsistency::BEFORE },
+                                    { "within", ViewConsistency::WITHIN } },
+                                  "where the constraint on five points is used"),
+      },
+      parameters(params.consistency),
+      {
+          boolean("guided", params.guided, "look for more matches along the geometry found"),
+      },
+      parameters(params.guidance),
+      {
+          real("first_share", params.first_share, "", "(0, 1]",
+               "part of the profiles that votes at first; all do if it is too little"),
+          boolean("scale_search", params.scale_search, "try other scales when the first finds no geometry"),
+          real("min_significance", params.min_log_significance, "", ">= 0",
+               "-log10 of the false alarms a geometry may have"),
+          natural("seed", params.seed, "of all random draws"),
+      },
+      parameters(params.ransac),
+  });
+}
+
 std::vector<std::string> PointViewMatcherParams::validate() const
 {
-  std::vector<std::string> faults;
-  for (const std::vector<std::string>& more :
-       { points.validate(), ransac.validate(), hypotheses.validate(), consistency.validate(), guidance.validate() })
-  {
-    faults.insert(faults.end(), more.begin(), more.end());
-  }
+  std::vector<std::string> faults = faultsOf(*this);
   if (view_consistency == ViewConsistency::BEFORE && estimator != GeometryEstimator::RANSAC)
   {
     faults.emplace_back("view_consistency before filters candidates, which only estimator ransac keeps to");
-  }
-  if (!(min_log_significance >= 0.0))
-  {
-    faults.emplace_back("min_significance must be at least 0");
-  }
-  if (!(first_share > 0.0 && first_share <= 1.0))
-  {
-    faults.emplace_back("first_share must lie in (0, 1]");
   }
   return faults;
 }
@@ -514,14 +363,14 @@ PointViewMatcher::PointViewMatcher(const PointViewMatcherParams& params) : param
 }
 
 ViewMatch PointViewMatcher::match(const PreparedImage& reference, const PreparedImage& current, GeometryModel model,
-                             double inlier_threshold, const std::function<bool()>& given_up) const
+                                  double inlier_threshold, const std::function<bool()>& given_up) const
 {
   if (!(inlier_threshold >= 0.0) || std::isinf(inlier_threshold))
   {
     throw std::invalid_argument("inlier_threshold must be a number of pixels, or 0 for the parameter");
   }
   const double threshold = inlier_threshold > 0.0 ? inlier_threshold : params_.ransac.inlier_threshold;
-  const Geometry geometry(model, params_, threshold);
+  const std::unique_ptr<const PairGeometry> geometry = makePairGeometry(model, params_, threshold);
   Rng rng(params_.seed);
 
   ViewMatch result;
@@ -531,7 +380,7 @@ ViewMatch PointViewMatcher::match(const PreparedImage& reference, const Prepared
   StageClock clock(result.stages);
   bool any_features = false;
   bool ended_early = false;
-  for (const Trial& trial : trials(params_))
+  for (const LevelTrial& trial : levelTrials(params_))
   {
     ended_early = given_up && given_up();
     if (ended_early)
@@ -542,7 +391,7 @@ ViewMatch PointViewMatcher::match(const PreparedImage& reference, const Prepared
     clock.finish("reference");
     current.points(trial.levels.current);
     clock.finish("current");
-    Attempt attempt(reference, current, trial, geometry, params_);
+    Attempt attempt(reference, current, trial, *geometry, params_);
     if (!attempt.hasFeatures())
     {
       continue;
@@ -568,8 +417,7 @@ ViewMatch PointViewMatcher::match(const PreparedImage& reference, const Prepared
   if (result.outcome == MatchOutcome::MATCHED)
   {
     result.message = std::to_string(result.inliers) + " of " + std::to_string(result.matches.size()) +
-                     " matches agree with one " +
-                     (model == GeometryModel::HOMOGRAPHY ? "homography" : "fundamental matrix");
+                     " matches agree with one " + geometry->name();
   }
   else if (ended_early)
   {

@@ -2,7 +2,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-#include "view_servo/views/point_view_matcher.h"
+#include "view_servo/views/view_match.h"
 
 #include <chrono>
 #include <string>

@@ -3,7 +3,7 @@
 #include "view_servo/control/heading_vote.h"
 
 #include "support/synthetic_scene.h"
-#include "view_servo/geometry/planar_motion.h"
+#include "view_servo/geometry/planar_pose.h"
 
 #include <gtest/gtest.h>
 

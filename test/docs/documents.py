@@ -2,6 +2,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """What the documents say that can be tried: commands, names in backticks, tables, links and sources."""
 import collections
+import glob
 import os
 import re
 
@@ -14,10 +15,15 @@ Row = collections.namedtuple("Row", "place section head cells")
 
 
 def documents():
-    """The documents that are tried, README.md first: the order of commands within one matters."""
-    docs = os.path.join(ROOT, "docs")
-    return ["README.md"] + sorted(os.path.join("docs", name) for name in os.listdir(docs) if name.endswith(".md")) + \
-        ["CONTRIBUTING.md", os.path.join("config", "worlds", "README.md")]
+    """The documents that are tried, in the order in which they are read: commands use what others before them have saved."""
+    first = ["README.md", "docs/bring_up.md", "docs/nodes.md"]
+    found = {os.path.relpath(path, ROOT) for path in glob.glob(os.path.join(ROOT, "docs", "**", "*.md"), recursive=True)}
+    return first + sorted(found - set(first)) + ["CONTRIBUTING.md", "config/worlds/README.md"]
+
+
+def anchor_of(heading):
+    """What a link says after # to lead to a heading, as GitHub makes it."""
+    return re.sub(r"[^\w\- ]", "", heading.lower()).replace(" ", "-")
 
 
 class Document:
@@ -30,8 +36,11 @@ class Document:
         self.sources = []    # fenced blocks
         self.rows = []       # of tables
         self.links = []
+        self.anchors = set()
         with open(os.path.join(ROOT, path), encoding="utf-8") as file:
-            self._read(file.read().split("\n"))
+            text = file.read()
+        self.line_count = text.count("\n")
+        self._read(text.split("\n"))
 
     def _read(self, lines):
         section = ""
@@ -55,6 +64,7 @@ class Document:
                 continue
             if line.startswith("#"):
                 section = line.lstrip("# ")
+                self.anchors.add(anchor_of(section))
             if line.startswith("|"):
                 cells = [cell.strip() for cell in re.split(r"(?<!\\)\|", line)[1:-1]]
                 if head is None:
@@ -84,5 +94,5 @@ class Document:
         for name in re.findall(r"`([^`]+)`", text):
             self.names.append(Name(place, name))
         for link in re.findall(r"\]\(([^)\s]+)\)", text):
-            if not re.match(r"[a-z]+://|#", link):
-                self.links.append(Name(place, link.split("#")[0]))
+            if not re.match(r"[a-z]+://", link):
+                self.links.append(Name(place, link))

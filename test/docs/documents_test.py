@@ -3,7 +3,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """
 Tries what the documents say. Every command in an indented block, or in backticks, is run, or as much of it as harms nothing;
-every name in backticks has to be known to running nodes, or to the sources; C++ and CMake are built; links lead to files.
+every name in backticks has to be known to running nodes, or to the sources; C++ and CMake are built; links lead to files and
+headings; drawings name what the sources have.
 A command of a form that is not known here, or a name that nothing explains, is a failure: teach this test what to do.
 """
 import collections
@@ -156,6 +157,9 @@ class Documented(unittest.TestCase):
 
     def try_command(self, text):
         text = text.replace("/tmp/", self.graphs[0].directory + "/")
+        if text.startswith("("):  # a shell of its own
+            self.assertTrue(text.endswith(")"))
+            text = text[1:-1]
         for part in text.split(" && "):
             words = shlex.split(part)
             while words and re.match(r"[A-Z_]+=", words[0]):
@@ -168,7 +172,7 @@ class Documented(unittest.TestCase):
 
     def kind_of(self, words):
         kinds = {"roslaunch": self.try_roslaunch, "rosrun": self.try_rosrun, "rosservice": self.try_rosservice,
-                 "rostopic": self.try_rostopic, "source": self.try_source}
+                 "rostopic": self.try_rostopic, "source": self.try_source, "cd": self.try_cd, "ctest": self.try_ctest}
         if words[0] in kinds:
             return kinds[words[0]]
         if words[0].startswith("scripts/"):
@@ -186,6 +190,19 @@ class Documented(unittest.TestCase):
         spaces = os.environ["CMAKE_PREFIX_PATH"].split(":")
         self.assertTrue(os.path.exists(os.path.join(spaces[0], "setup.bash")), spaces)
 
+    def try_cd(self, words):
+        self.assertEqual(words[1:], ["build"])
+
+    def try_ctest(self, words):
+        self.assertEqual(words[1], "-L")
+        lists = re.findall(r"LABELS((?: \w+)+)", self.read("test", "CMakeLists.txt"))
+        self.assertIn(words[2], {label for text in lists for label in text.split()})
+
+    @staticmethod
+    def read(*path):
+        with open(os.path.join(ROOT, *path)) as file:
+            return file.read()
+
     def try_script(self, words):
         script = os.path.join(ROOT, words[0])
         self.assertTrue(os.access(script, os.X_OK), script)
@@ -197,10 +214,9 @@ class Documented(unittest.TestCase):
             self.assertTrue(set(words[1:]) <= set(re.findall(r"\w+", known.split("known:")[1])), known)
         elif words[0] == "scripts/build":
             targets = [word for word in words[1:] if not word.startswith("-D")]
-            with open(os.path.join(ROOT, "CMakeLists.txt")) as file:
-                text = file.read()
+            text = self.read("CMakeLists.txt") + self.read("bench", "CMakeLists.txt")
             for target in targets:
-                self.assertTrue(target == "tests" or "add_custom_target(%s" % target in text, target)
+                self.assertTrue(target == "tests" or "add_custom_target(%s)" % target in text, target)
         elif words[:2] == ["scripts/test", "--sanitize"]:
             # To run it would take longer than all other tests: the sanitizer is one that its help names, and the tests exist.
             self.assertIn(" ".join(words[:3]) + " ", self.run_here("%s --help" % script))
@@ -216,12 +232,15 @@ class Documented(unittest.TestCase):
         """Benchmarks, which are not built for tests, and tests themselves: the sources have to know what is asked for."""
         name = os.path.basename(words[0])
         if name.startswith("bench_"):
-            source = os.path.join(ROOT, "bench", name + ".cpp")
+            self.assertIn("vs_bench(%s " % name, self.read("bench", "CMakeLists.txt"))
+            text = self.read("bench", name + ".cpp")
         else:
-            room, test = name.split("_", 1)
-            source = os.path.join(ROOT, "test", room, test + ".cpp")
-        with open(source) as file:
-            text = file.read()
+            self.assertTrue(name.endswith("_test"), name)
+            room = name[:-len("_test")]
+            self.assertIn("vs_gtest(%s " % room, self.read("test", "CMakeLists.txt"))
+            sources = glob.glob(os.path.join(ROOT, "test", room, "*_test.cpp"))
+            self.assertTrue(sources, room)
+            text = "".join(self.read(source) for source in sources)
         for word in words[1:]:
             match = re.fullmatch(r"--gtest_filter=\*(\w+)\*", word)
             self.assertTrue(match and match.group(1) in text or '"%s"' % word in text, word)
@@ -386,10 +405,32 @@ class Documented(unittest.TestCase):
                 for key, value in yaml.safe_load(file).items():
                     names.add(key)
                     names.update(value if isinstance(value, dict) else [])
-        for path in [os.path.join(ROOT, "docs", "parameters.md")]:
-            for row in documents.Document(os.path.relpath(path, ROOT)).rows:
-                names.update(re.findall(r"\w+", row.cells[1]))  # values that words stand for
+        for row in self.document("docs/parameters.md").rows:
+            names.update(re.findall(r"\w+", row.cells[1]))  # values that words stand for
         return names
+
+    def document(self, path):
+        return next(document for document in self.documents if document.path == path)
+
+    @staticmethod
+    def source_files():
+        """Texts of what is compiled, by path."""
+        paths = [path for folder in ("include", "src") for path in
+                 glob.glob(os.path.join(ROOT, folder, "**", "*.*"), recursive=True)]
+        return {path: Documented.read(path) for path in paths}
+
+    @staticmethod
+    @functools.lru_cache(maxsize=None)
+    def path_ends():
+        """How the paths of this package's files and directories end, with and without the files' extensions."""
+        ends = set()
+        for folder, directories, files in os.walk(ROOT):
+            directories[:] = [name for name in directories if name not in (".git", "build", "devel", "install")]
+            for name in directories + files:
+                parts = os.path.relpath(os.path.join(folder, name), ROOT).split(os.sep)
+                for path in ("/".join(parts[first:]) for first in range(len(parts))):
+                    ends.update((path, os.path.splitext(path)[0]))
+        return ends
 
     def fields(self):
         """Names of fields of this package's messages, services and actions, and of a twist."""
@@ -422,12 +463,9 @@ class Documented(unittest.TestCase):
             known.update(publishers, subscribers, services, running.nodes())
         known.update(name[:-len("/goal")] for name in list(known) if name.endswith("/goal"))
         last_parts = {name.split("/")[-1] for name in known}
-        sources = ""
-        for path in glob.glob(os.path.join(ROOT, "include", "**", "*.h"), recursive=True) + \
-                glob.glob(os.path.join(ROOT, "src", "**", "*.*"), recursive=True) + \
-                [os.path.join(ROOT, name) for name in ("CMakeLists.txt", "package.xml", "scripts/plot_run", "test/rostest/node_test.h")]:
-            with open(path) as file:
-                sources += file.read()
+        sources = "".join(self.source_files().values())
+        for path in ("CMakeLists.txt", "test/CMakeLists.txt", "package.xml", "scripts/plot_run", "test/rostest/node_test.h"):
+            sources += self.read(path)
         words = set(re.findall(r"\w+", sources.replace("${PROJECT_NAME}", PACKAGE)))
 
         def is_known(text):
@@ -445,10 +483,11 @@ class Documented(unittest.TestCase):
             match = re.fullmatch(r"#include <view_servo/(\w+)\.h>", text)
             if match:
                 return self.type_exists(match.group(1))
+            if text.endswith("_test") and "vs_gtest(%s " % text[:-len("_test")] in sources:
+                return True
             if os.path.dirname(text) == "build":  # made by the build
                 return os.path.basename(text) in sources
-            if os.path.exists(os.path.join(ROOT, text)) or glob.glob(os.path.join(ROOT, "*", text)) or \
-                    glob.glob(os.path.join(ROOT, "*", "*", text + ".*")):
+            if text.rstrip("/") in self.path_ends():
                 return True
             if re.fullmatch(r"\w+/?\w+", text) and self.type_exists(text):
                 return True
@@ -465,11 +504,14 @@ class Documented(unittest.TestCase):
     def test_tables_of_nodes(self):
         """Services, actions and topics have the types, and the direction, that the tables say."""
         count = 0
-        for row in self.documents[0].rows:
-            section = re.fullmatch(r"`(\w+)`", row.section)
-            if not section or len(row.cells) != 3 or row.head[0] not in ("service", "action, service", "topic"):
+        nodes = set()
+        for row in self.document("docs/nodes.md").rows:
+            if row.head[0] not in ("service", "action, service", "topic"):
                 continue
+            section = re.fullmatch(r"`(\w+)`", row.section)
+            self.assertTrue(section and len(row.cells) == 3, row)
             node = "/" + section.group(1)
+            nodes.add(section.group(1))
             running = self.graph_of(node)
             names = [name for name in re.findall(r"`([^`]+)`", row.cells[0])]
             types = [name for name in re.findall(r"`([^`]+)`", row.cells[1])]
@@ -479,7 +521,9 @@ class Documented(unittest.TestCase):
                     count += 1
                     type_name = types[min(index, len(types) - 1)] if types else None
                     self.assert_offered(running, node, name, type_name, row)
-        self.assertGreater(count, 30)
+        self.assertGreater(count, 60)
+        programs = {os.path.basename(path)[:-len(".cpp")] for path in glob.glob(os.path.join(ROOT, "src", "nodes", "*.cpp"))}
+        self.assertEqual(nodes, {name for name in programs if not name.startswith("run_")})
 
     def graph_of(self, node):
         return next((running for running in self.graphs if node in running.nodes()), None)
@@ -499,7 +543,7 @@ class Documented(unittest.TestCase):
         if name.startswith("~"):
             found = [node + "/" + name[1:]]
         else:  # launch files give other names to what a node subscribes
-            found = [topic for topic in here if topic.split("/")[-1] == name and node in here[topic]]
+            found = [topic for topic in here if topic.endswith("/" + name) and node in here[topic]]
         self.assertTrue(found and node in here.get(found[0], []), "%s has no such topic %s" % (node, name))
         if full_type:
             self.assertEqual(running.topic_types()[found[0]], full_type)
@@ -508,32 +552,91 @@ class Documented(unittest.TestCase):
         """docs/parameters.md has the names and the defaults of the files in config/."""
         files = {"Points": "point_matcher", "Lines": "line_matcher", "Homing": "homing",
                  "Homography tracker": "homography_tracker", "2.5D servoing": "servo_25d"}
-        document = next(one for one in self.documents if one.path.endswith("parameters.md"))
         count = collections.Counter()
-        for row in document.rows:
+        for row in self.document("docs/parameters.md").rows:
             with self.subTest(where=row.place, row=row.cells[0]):
-                with open(os.path.join(ROOT, "config", files[row.section] + ".yaml")) as file:
-                    values = yaml.load(file, Loader=yaml.BaseLoader)
-                value, default = values[row.cells[0].strip("`")], row.cells[2]
+                self.assert_default(files[row.section], row.cells[0].strip("`"), row.cells[2])
                 count[row.section] += 1
-                try:
-                    self.assertEqual(float(value), float(default))
-                except ValueError:
-                    self.assertEqual(value, default)
         self.assertEqual(set(count), set(files))
 
-    # --------------------------------------------------------------------------------------------- links and sources
+    def test_parameters_of_nodes(self):
+        """Where docs/nodes.md gives a default, it is that of the files in config/."""
+        count = 0
+        for row in self.document("docs/nodes.md").rows:
+            if row.head[0] != "parameter" or not row.cells[1] or row.cells[1].startswith("`$"):
+                continue
+            for name in re.findall(r"`~([^`]+)`", row.cells[0]):
+                with self.subTest(where=row.place, row=name):
+                    self.assert_default(row.section.strip("`"), name, row.cells[1].strip("`"))
+                    count += 1
+        self.assertGreater(count, 15)
+
+    def assert_default(self, file, name, default):
+        value = yaml.load(self.read("config", file + ".yaml"), Loader=yaml.BaseLoader)[name]
+        try:
+            self.assertEqual(float(value), float(default))
+        except ValueError:
+            self.assertEqual(value, default)
+
+    def test_messages(self):
+        """What docs/bring_up.md says that nodes say, they say."""
+        sources = "".join(self.source_files().values())
+        count = 0
+        for row in self.document("docs/bring_up.md").rows:
+            if row.head[0] == "it says":
+                for message in re.findall(r'"([^"]+)"', row.cells[0]):
+                    with self.subTest(where=row.place, message=message):
+                        count += 1
+                        self.assertRegex(sources, r'"[^"\n]*' + re.escape(message))
+        self.assertGreater(count, 5)
+
+    def test_rooms(self):
+        """docs/architecture.md has all rooms, in the order that scripts/check_rooms enforces."""
+        rooms = [row.cells[0].strip("`") for row in self.document("docs/architecture.md").rows if row.head[0] == "room"]
+        check = self.read("scripts", "check_rooms")
+        core = re.search(r'split\("([a-z_ ]+)", core\)', check).group(1).split(" ")
+        self.assertEqual(rooms, core + re.findall(r'allow\("(\w+)"', check))
+        self.assertEqual(set(rooms), set(os.listdir(os.path.join(ROOT, "src"))))
+
+    # --------------------------------------------------------------------------------- length, links, drawings, sources
+
+    def test_length(self):
+        """Who looks for something finds it at once."""
+        for document in self.documents:
+            most = 199 if document.path == "README.md" else 250
+            with self.subTest(where=document.path):
+                self.assertLessEqual(document.line_count, most)
 
     def test_links(self):
+        anchors = {os.path.join(ROOT, document.path): document.anchors for document in self.documents}
         for document in self.documents:
+            here = os.path.join(ROOT, document.path)
             for link in document.links:
                 with self.subTest(where=link.place, link=link.text):
-                    self.assertTrue(os.path.exists(os.path.join(ROOT, os.path.dirname(document.path), link.text)))
+                    path, _, anchor = link.text.partition("#")
+                    target = os.path.normpath(os.path.join(os.path.dirname(here), path)) if path else here
+                    self.assertTrue(os.path.exists(target))
+                    if anchor:
+                        self.assertIn(anchor, anchors[target])
+
+    def test_drawings(self):
+        """Classes, methods and functions in drawings are in the sources, methods in a file that names their class."""
+        files = [set(re.findall(r"\w+", text)) for text in self.source_files().values()]
+        count = 0
+        for document in self.documents:
+            for source in document.sources:
+                if source.language != "text":
+                    continue
+                for name in re.findall(r"\w+(?:::\w+)+|\w*[a-z]\w*[A-Z]\w*", source.text):
+                    with self.subTest(where=source.place, name=name):
+                        count += 1
+                        self.assertTrue(any(set(name.split("::")) <= words for words in files), "nothing has this name")
+        self.assertGreater(count, 50)
 
     def test_sources(self):
         """The C++ is built by the CMake lines below it, and finds one picture in the other."""
         sources = [source for document in self.documents for source in document.sources]
-        self.assertEqual({source.language for source in sources}, {"cpp", "cmake", "yaml"})
+        self.assertEqual({source.language for source in sources}, {"cpp", "cmake", "yaml", "text"})
         folder = os.path.join(self.directory, "find_goal")
         os.mkdir(folder)
         cpp = [source.text for source in sources if source.language == "cpp"]

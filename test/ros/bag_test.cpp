@@ -143,7 +143,7 @@ ViewMatch match(const PointViewMatcher& matcher, const PreparedImage& reference,
 ViewMatch match(const LineViewMatcher& matcher, const PreparedImage& reference, const PreparedImage& current,
                 GeometryModel model)
 {
-  return matcher.match(reference.lines(), current.lines(), model, LineGrouping::TRIPLETS);
+  return matcher.match(reference, current, model);
 }
 
 /** What became of the frames of a run. */

@@ -1,83 +1,227 @@
 // Copyright (c) 2026, the view_servo authors
 // SPDX-License-Identifier: BSD-3-Clause
-#include "view_servo/control/homing_parameters.h"
-#include "view_servo/control/servo_parameters.h"
-#include "view_servo/tracking/plane_tracker_parameters.h"
-#include "view_servo/views/matcher_parameters.h"
+
+/** @file
+ * The files in config/ and the tables in docs/parameters.md say what the tables of parameters in the sources say: names,
+ * types, defaults, units, ranges and meanings. VIEW_SERVO_UPDATE=1 writes them anew.
+ */
 #include "test_paths.h"
+#include "view_servo/parameters/parameter.h"
+#include "view_servo/ros/driver_params.h"
+#include "view_servo/ros/node_params.h"
+#include "view_servo/ros/streaming_matcher.h"
+#include "view_servo/views/line_view_matcher.h"
+#include "view_servo/views/point_view_matcher.h"
 
 #include <gtest/gtest.h>
 #include <yaml-cpp/yaml.h>
 
+#include <cstdlib>
+#include <fstream>
+#include <set>
+#include <sstream>
 #include <string>
+#include <utility>
 #include <vector>
 
 namespace view_servo
 {
 namespace
 {
-/** What is there is documented in the file: every parameter, with its default. */
-void expectEveryParameterAtItsDefault(const std::string& file, const std::vector<Parameter>& table,
-                                      const std::vector<std::string>& of_the_node)
+/** All tables, bound to defaults. */
+class Tables
 {
-  SCOPED_TRACE(file);
-  const YAML::Node config = YAML::LoadFile(PACKAGE_DIR "/config/" + file);
-  EXPECT_EQ(config.size(), of_the_node.size() + table.size());
-  for (const std::string& name : of_the_node)
-  {
-    EXPECT_TRUE(config[name]) << name;
-  }
-  for (const Parameter& parameter : table)
-  {
-    ASSERT_TRUE(config[parameter.name]) << parameter.name;
-    const std::string standard = parameter.get();
-    EXPECT_TRUE(parameter.set(config[parameter.name].as<std::string>())) << parameter.name;
-    EXPECT_EQ(parameter.get(), standard) << parameter.name;
-  }
-}
+public:
+  StreamingMatcherParams points_node;
+  StreamingMatcherParams lines_node;
+  PointViewMatcherParams points;
+  LineMatcherParams lines;
+  HomingDriverParams homing;
+  HomographyTrackerNodeParams tracker;
+  ServoDriverParams servo;
+  ViewStoreNodeParams store;
 
-const std::vector<std::string> OF_MATCHERS = {
-  "view", "rate", "views_dir", "allow_paths", "image_transport", "queue_size", "max_image_age", "image_patience"
+  Tables()
+  {
+    lines_node.rate = 10.0;
+  }
+
+  /** Titles and tables of a file in config/. */
+  using Sections = std::vector<std::pair<std::string, std::vector<Parameter>>>;
+
+  std::vector<std::pair<std::string, Sections>> files()
+  {
+    return {
+      { "point_matcher",
+        { { "the node", parameters(points_node) },
+          { "matching; these are also names of `match_images points --set name=value`", parameters(points) } } },
+      { "line_matcher",
+        { { "the node", parameters(lines_node) },
+          { "matching; these are also names of `match_images lines --set name=value`", parameters(lines) } } },
+      { "homing", { { "the node, homing and the base", parameters(homing) } } },
+      { "homography_tracker", { { "the node and tracking", parameters(tracker) } } },
+      { "servo_25d", { { "the node, servoing and the camera's motion", parameters(servo) } } },
+    };
+  }
+
+  /** Headings and tables of docs/parameters.md. */
+  Sections documented()
+  {
+    return { { "## Matchers", parameters(points_node) },
+             { "## Points", parameters(points) },
+             { "## Lines", parameters(lines) },
+             { "# Homing", parameters(homing) },
+             { "# Homography tracker", parameters(tracker) },
+             { "# 2.5D servoing", parameters(servo) },
+             { "# View store", parameters(store) } };
+  }
 };
 
-TEST(Config, PointMatcherHasEveryParameterAtItsDefault)
+/** "meaning [unit], range" */
+std::string meaning(const Parameter& parameter)
 {
-  PointViewMatcherParams params;
-  expectEveryParameterAtItsDefault("point_matcher.yaml", matcherParameters(params), OF_MATCHERS);
+  const std::string words = parameter.type.find('|') == std::string::npos ? "" : " (" + parameter.type + ")";
+  return parameter.description + words + (parameter.unit.empty() ? "" : " [" + parameter.unit + "]") +
+         (parameter.range.empty() ? "" : ", " + parameter.range);
 }
 
-TEST(Config, LineMatcherHasEveryParameterAtItsDefault)
+std::string commented(const std::string& text)
 {
-  LineMatcherParams params;
-  expectEveryParameterAtItsDefault("line_matcher.yaml", matcherParameters(params), OF_MATCHERS);
+  constexpr std::size_t WIDTH = 120;
+  std::istringstream words(text);
+  std::string result;
+  std::string line = "#";
+  for (std::string word; words >> word; line += " " + word)
+  {
+    if (line.size() + 1 + word.size() > WIDTH)
+    {
+      result += line + "\n";
+      line = "#";
+    }
+  }
+  return result + line + "\n";
 }
 
-TEST(Config, HomingHasEveryParameterAtItsDefault)
+std::string yamlOf(const std::string& node, const Tables::Sections& sections)
 {
-  HomingParams params;
-  VelocityLimits limits;
-  expectEveryParameterAtItsDefault(
-      "homing.yaml", homingParameters(params, limits),
-      { "view", "views_dir", "base_frame", "dry_run", "timeout", "start_patience", "control_rate", "image_timeout",
-        "odometry_timeout", "match_timeout", "image_transport", "queue_size", "max_image_age" });
+  std::string text = commented("Parameters of the node " + node +
+                               ", at their defaults. Above each stands what it means, [its unit] and its range. "
+                               "docs/parameters.md says which to turn.");
+  for (const auto& [title, table] : sections)
+  {
+    text += "\n# --- " + title + "\n";
+    for (const Parameter& parameter : table)
+    {
+      const std::string value = parameter.get();
+      text += "\n" + commented(meaning(parameter)) + parameter.name + ": " + (value.empty() ? "\"\"" : value) + "\n";
+    }
+  }
+  return text;
 }
 
-TEST(Config, HomographyTrackerHasEveryParameterAtItsDefault)
+std::string rowsOf(const std::vector<Parameter>& table)
 {
-  PlaneTrackerParams params;
-  expectEveryParameterAtItsDefault("homography_tracker.yaml", planeTrackerParameters(params),
-                                   { "view", "views_dir", "odom_frame", "tf_patience", "match_period",
-                                     "image_transport", "queue_size", "max_image_age" });
+  std::string text = "| name | type | default | unit | range | meaning |\n|---|---|---|---|---|---|\n";
+  for (const Parameter& parameter : table)
+  {
+    std::string type = parameter.type;
+    for (std::size_t at = 0; (at = type.find('|', at)) != std::string::npos;)
+    {
+      type.replace(at, 1, ", ");
+    }
+    const std::string value = parameter.get();
+    text += "| `" + parameter.name + "` | " + type + " | " + (value.empty() ? "\"\"" : value) + " | " + parameter.unit +
+            " | " + parameter.range + " | " + parameter.description + " |\n";
+  }
+  return text;
 }
 
-TEST(Config, ServoHasEveryParameterAtItsDefault)
+std::string read(const std::string& file)
 {
-  Servo25dParams params;
-  VelocityLimits limits = ARM_LIMITS;
-  expectEveryParameterAtItsDefault(
-      "servo_25d.yaml", servoParameters(params, limits),
-      { "views_dir", "dry_run", "timeout", "start_patience", "acquire_timeout", "control_rate", "joint_timeout",
-        "homography_timeout", "max_homography_age", "joint_margin" });
+  std::ifstream stream(file);
+  EXPECT_TRUE(stream) << file;
+  return std::string(std::istreambuf_iterator<char>(stream), std::istreambuf_iterator<char>());
+}
+
+/** Compares, or writes where that is asked for. */
+void expectText(const std::string& file, const std::string& text)
+{
+  if (std::getenv("VIEW_SERVO_UPDATE") != nullptr)
+  {
+    std::ofstream(file) << text;
+  }
+  EXPECT_EQ(read(file), text) << "run this test with VIEW_SERVO_UPDATE=1 to write " << file << " anew";
+}
+
+TEST(Config, FilesSayWhatTheTablesSay)
+{
+  Tables tables;
+  for (const auto& [node, sections] : tables.files())
+  {
+    expectText(PACKAGE_DIR "/config/" + node + ".yaml", yamlOf(node, sections));
+  }
+}
+
+TEST(Config, FilesHoldTheDefaults)
+{
+  Tables tables;
+  for (const auto& [node, sections] : tables.files())
+  {
+    SCOPED_TRACE(node);
+    const YAML::Node config = YAML::LoadFile(PACKAGE_DIR "/config/" + node + ".yaml");
+    std::size_t count = 0;
+    for (const auto& section : sections)
+    {
+      count += section.second.size();
+      for (const Parameter& parameter : section.second)
+      {
+        ASSERT_TRUE(config[parameter.name]) << parameter.name;
+        const std::string standard = parameter.get();
+        EXPECT_TRUE(parameter.set(config[parameter.name].as<std::string>())) << parameter.name;
+        EXPECT_EQ(parameter.get(), standard) << parameter.name;
+      }
+    }
+    EXPECT_EQ(config.size(), count) << "as many names as parameters";
+  }
+}
+
+TEST(Config, DocumentedTablesAreThoseOfTheSources)
+{
+  Tables tables;
+  const std::string file = PACKAGE_DIR "/docs/parameters.md";
+  std::string text = read(file);
+  for (const auto& [heading, table] : tables.documented())
+  {
+    const std::size_t section = text.find("\n" + heading + "\n");
+    ASSERT_NE(section, std::string::npos) << heading;
+    const std::size_t begin = text.find("\n| name |", section) + 1;
+    ASSERT_NE(begin, 0U) << heading;
+    const std::size_t end = text.find("\n\n", begin);
+    text.replace(begin, (end == std::string::npos ? text.size() : end + 1) - begin, rowsOf(table));
+  }
+  expectText(file, text);
+}
+
+TEST(Config, DefaultsAreValidAndNamesUnique)
+{
+  Tables tables;
+  for (const auto& [heading, table] : tables.documented())
+  {
+    SCOPED_TRACE(heading);
+    EXPECT_EQ(faultsOf(table), std::vector<std::string>());
+    std::set<std::string> names;
+    for (const Parameter& parameter : table)
+    {
+      EXPECT_TRUE(names.insert(parameter.name).second) << parameter.name;
+      EXPECT_FALSE(parameter.description.empty()) << parameter.name;
+    }
+  }
+  EXPECT_EQ(tables.points_node.validate(), std::vector<std::string>());
+  EXPECT_EQ(tables.points.validate(), std::vector<std::string>());
+  EXPECT_EQ(tables.lines.validate(), std::vector<std::string>());
+  EXPECT_EQ(tables.homing.validate(), std::vector<std::string>());
+  EXPECT_EQ(tables.tracker.validate(), std::vector<std::string>());
+  EXPECT_EQ(tables.servo.validate(), std::vector<std::string>());
 }
 
 }  // namespace

@@ -70,8 +70,8 @@ TEST(Rectifier, KnowsItsCalibration)
   const Rectifier rectifier(cameraInfo(-0.2));
   sensor_msgs::CameraInfo info = cameraInfo(-0.2);
   info.header.stamp = ros::Time(2.0);
-  EXPECT_TRUE(rectifier.isOf(info));
-  EXPECT_FALSE(rectifier.isOf(cameraInfo(-0.1)));
+  EXPECT_TRUE(rectifier.hasCalibration(info));
+  EXPECT_FALSE(rectifier.hasCalibration(cameraInfo(-0.1)));
 }
 
 TEST(Rectifier, RefusesWhatItCannotDo)

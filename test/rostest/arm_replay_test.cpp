@@ -4,7 +4,7 @@
 #include "node_test.h"
 #include "sim/renderer.h"
 #include "sim/visibility.h"
-#include "sim/world.h"
+#include "sim/world_reader.h"
 #include "support/recorded_bag.h"
 #include "support/temporary_directory.h"
 

@@ -3,6 +3,7 @@
 #include "child_process.h"
 #include "node_test.h"
 #include "sim_ros/robot_messages.h"
+#include "sim/world_reader.h"
 #include "sim/nomad.h"
 #include "sim/renderer.h"
 #include "support/recorded_bag.h"
@@ -10,7 +11,7 @@
 
 #include "view_servo/Heading.h"
 #include "view_servo/SetView.h"
-#include "view_servo/geometry/planar_motion.h"
+#include "view_servo/geometry/planar_pose.h"
 #include "view_servo/views/view_store.h"
 #include "test_paths.h"
 

@@ -1,6 +1,6 @@
 // Copyright (c) 2026, the view_servo authors
 // SPDX-License-Identifier: BSD-3-Clause
-#include "sim/world.h"
+#include "sim/world_reader.h"
 
 #include "sim/nomad.h"
 #include "sim/renderer.h"

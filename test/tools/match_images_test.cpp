@@ -302,7 +302,7 @@ TEST_F(MatchImages, listsParameters)
 {
   const Outcome outcome = run({ "--list-parameters" });
   EXPECT_EQ(outcome.status, 0);
-  EXPECT_NE(outcome.out.find("max_corners (int, default 500): "), std::string::npos) << outcome.out;
+  EXPECT_NE(outcome.out.find("max_corners (int, default 500, [1, 5000]): "), std::string::npos) << outcome.out;
 }
 
 TEST_F(MatchImages, refusesUnknownParametersAndValues)

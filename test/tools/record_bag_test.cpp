@@ -3,7 +3,7 @@
 // Runs the program itself, as a shell would, and reads what it wrote.
 #include "sim_ros/robot_messages.h"
 #include "sim/puma.h"
-#include "sim/world.h"
+#include "sim/world_reader.h"
 #include "support/temporary_directory.h"
 #include "view_servo/ros/conversions.h"
 #include "test_paths.h"

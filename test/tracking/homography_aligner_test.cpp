@@ -3,7 +3,7 @@
 #include "view_servo/tracking/homography_aligner.h"
 
 #include "sim/renderer.h"
-#include "sim/world.h"
+#include "sim/world_reader.h"
 #include "support/textured_plane.h"
 #include "view_servo/geometry/homography.h"
 #include "test_paths.h"

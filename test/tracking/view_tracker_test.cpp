@@ -4,7 +4,7 @@
 
 #include "sim/renderer.h"
 #include "sim/visibility.h"
-#include "sim/world.h"
+#include "sim/world_reader.h"
 #include "support/textured_plane.h"
 #include "view_servo/robust/random.h"
 #include "test_paths.h"

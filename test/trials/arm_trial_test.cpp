@@ -1,6 +1,7 @@
 // Copyright (c) 2026, the view_servo authors
 // SPDX-License-Identifier: BSD-3-Clause
 #include "trials/arm_trial.h"
+#include "sim/world_reader.h"
 
 #include "view_servo/geometry/homography.h"
 #include "test_paths.h"

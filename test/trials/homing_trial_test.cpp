@@ -1,6 +1,7 @@
 // Copyright (c) 2026, the view_servo authors
 // SPDX-License-Identifier: BSD-3-Clause
 #include "trials/homing_trial.h"
+#include "sim/world_reader.h"
 
 #include "sim/visibility.h"
 #include "view_servo/robust/random.h"

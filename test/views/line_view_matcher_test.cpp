@@ -286,9 +286,9 @@ TEST(LineViewMatcher, SameInputSameResult)
 TEST(LineViewMatcher, NamesAllFaultsOfItsParameters)
 {
   LineMatcherParams params;
-  params.plane_threshold = 0.0;
-  params.min_plane_lines = 4;
-  params.max_planes = 0;
+  params.planes.threshold = 0.0;
+  params.planes.min_lines = 4;
+  params.planes.max_planes = 0;
   params.min_quality = 1.0;
   params.regions.max_candidates = 0;
   params.regions.max_trials = 0;

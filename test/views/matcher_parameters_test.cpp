@@ -1,6 +1,8 @@
 // Copyright (c) 2026, the view_servo authors
 // SPDX-License-Identifier: BSD-3-Clause
-#include "view_servo/views/matcher_parameters.h"
+#include "view_servo/parameters/parameter.h"
+#include "view_servo/views/line_view_matcher.h"
+#include "view_servo/views/point_view_matcher.h"
 
 #include <gtest/gtest.h>
 
@@ -13,10 +15,9 @@
 namespace
 {
 using view_servo::LineMatcherParams;
-using view_servo::matcherParameters;
 using view_servo::Parameter;
-using view_servo::setParameter;
 using view_servo::PointViewMatcherParams;
+using view_servo::setParameter;
 
 template <typename Params>
 class MatcherParameters : public ::testing::Test
@@ -30,7 +31,7 @@ TYPED_TEST(MatcherParameters, HaveUniqueDocumentedNames)
 {
   TypeParam params;
   std::set<std::string> names;
-  for (const Parameter& parameter : matcherParameters(params))
+  for (const Parameter& parameter : parameters(params))
   {
     EXPECT_TRUE(names.insert(parameter.name).second) << parameter.name;
     EXPECT_FALSE(parameter.description.empty()) << parameter.name;
@@ -42,7 +43,7 @@ TYPED_TEST(MatcherParameters, HaveUniqueDocumentedNames)
 TYPED_TEST(MatcherParameters, ReadBackWhatTheyPrint)
 {
   TypeParam params;
-  for (const Parameter& parameter : matcherParameters(params))
+  for (const Parameter& parameter : parameters(params))
   {
     const std::string before = parameter.get();
     EXPECT_TRUE(parameter.set(before)) << parameter.name << " = " << before;
@@ -54,7 +55,7 @@ TYPED_TEST(MatcherParameters, EachSetsSomethingOfItsOwn)
 {
   // Another value for each changes what its name reads, and nothing else.
   TypeParam params;
-  const auto table = matcherParameters(params);
+  const auto table = parameters(params);
   for (const Parameter& parameter : table)
   {
     const std::string before = parameter.get();
@@ -92,11 +93,11 @@ TYPED_TEST(MatcherParameters, EachSetsSomethingOfItsOwn)
 TEST(SetParameter, SetsNumbersWordsAndSwitches)
 {
   PointViewMatcherParams params;
-  setParameter(params, "max_corners", "321");
-  setParameter(params, "inlier_threshold", "2.5");
-  setParameter(params, "cyclic_order", "false");
-  setParameter(params, "search", "radius");
-  setParameter(params, "seed", "12345678901");
+  setParameter(parameters(params), "max_corners", "321");
+  setParameter(parameters(params), "inlier_threshold", "2.5");
+  setParameter(parameters(params), "cyclic_order", "false");
+  setParameter(parameters(params), "search", "radius");
+  setParameter(parameters(params), "seed", "12345678901");
   EXPECT_EQ(params.points.corners.max_corners, 321);
   EXPECT_EQ(params.ransac.inlier_threshold, 2.5);
   EXPECT_FALSE(params.points.cyclic_order);
@@ -107,18 +108,19 @@ TEST(SetParameter, SetsNumbersWordsAndSwitches)
 TEST(SetParameter, SetsThoseOfLines)
 {
   LineMatcherParams params;
-  setParameter(params, "detector", "lsd");
-  setParameter(params, "line_order", "upright");
-  setParameter(params, "segment_min_length", "20.5");
-  setParameter(params, "region_tolerance", "1.5");
-  setParameter(params, "inlier_threshold", "2.5");
+  setParameter(parameters(params), "detector", "lsd");
+  setParameter(parameters(params), "line_order", "upright");
+  setParameter(parameters(params), "segment_min_length", "20.5");
+  setParameter(parameters(params), "region_tolerance", "1.5");
+  setParameter(parameters(params), "inlier_threshold", "2.5");
   EXPECT_EQ(params.segments.detector, view_servo::SegmentDetector::LSD);
   EXPECT_EQ(params.features.groups.order, view_servo::LineOrder::UPRIGHT);
   EXPECT_EQ(params.segments.min_length, 20.5);
   EXPECT_EQ(params.regions.tolerance, 1.5);
   EXPECT_EQ(params.ransac.inlier_threshold, 2.5);
-  EXPECT_THROW(setParameter(params, "detector", "hough"), std::invalid_argument);
-  EXPECT_THROW(setParameter(params, "max_corners", "100"), std::invalid_argument) << "a parameter of points";
+  EXPECT_THROW(setParameter(parameters(params), "detector", "hough"), std::invalid_argument);
+  EXPECT_THROW(setParameter(parameters(params), "max_corners", "100"), std::invalid_argument)
+      << "a parameter of points";
 }
 
 TEST(MatcherParameterFaults, SayTheNamesOfLineParameters)
@@ -156,7 +158,7 @@ TEST(MatcherParameterFaults, SayTheNamesOfLineParameters)
                                                                                      { "min_quality", "1" } })
   {
     LineMatcherParams params;
-    setParameter(params, name, value);
+    setParameter(parameters(params), name, value);
     const std::vector<std::string> faults = params.validate();
     ASSERT_EQ(faults.size(), 1U) << name;
     EXPECT_EQ(faults.front().rfind(name + " ", 0), 0U) << name << ": " << faults.front();
@@ -168,7 +170,7 @@ TEST(SetParameter, NamesTheNearestWhenAskedForOneThatIsNot)
   PointViewMatcherParams params;
   try
   {
-    setParameter(params, "max_corner", "10");
+    setParameter(parameters(params), "max_corner", "10");
     FAIL() << "an unknown name was accepted";
   }
   catch (const std::invalid_argument& error)
@@ -192,11 +194,12 @@ TEST(SetParameter, RefusesValuesOfTheWrongTypeAndLeavesAllAsItWas)
                                                          { "search", "both" },
                                                          { "seed", "-1" } })
   {
-    EXPECT_THROW(setParameter(params, name, value), std::invalid_argument) << name << " = '" << value << "'";
+    EXPECT_THROW(setParameter(parameters(params), name, value), std::invalid_argument)
+        << name << " = '" << value << "'";
   }
   PointViewMatcherParams fresh;
-  const auto now = matcherParameters(params);
-  const auto then = matcherParameters(fresh);
+  const auto now = parameters(params);
+  const auto then = parameters(fresh);
   for (std::size_t i = 0; i < now.size(); ++i)
   {
     EXPECT_EQ(now[i].get(), then[i].get());

@@ -2,6 +2,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include "view_servo/parameters/parameter.h"
+
 #include <opencv2/core/mat.hpp>
 
 #include <string>
@@ -30,6 +32,9 @@ struct ArrivalDetectorParams
   /** All faults, one a line; empty when the parameters are usable. */
   std::vector<std::string> validate() const;
 };
+
+/** Names, units and ranges of these parameters, by which validate() checks them. */
+std::vector<Parameter> parameters(ArrivalDetectorParams& params);
 
 enum class Arrival
 {

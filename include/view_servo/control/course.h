@@ -3,7 +3,7 @@
 #pragma once
 
 #include "view_servo/control/velocity_limiter.h"
-#include "view_servo/geometry/planar_motion.h"
+#include "view_servo/geometry/planar_pose.h"
 
 #include <limits>
 

@@ -4,7 +4,8 @@
 
 #include "view_servo/control/heading_vote.h"
 #include "view_servo/geometry/essential.h"
-#include "view_servo/geometry/planar_motion.h"
+#include "view_servo/geometry/planar_pose.h"
+#include "view_servo/parameters/parameter.h"
 #include "view_servo/robust/random.h"
 
 #include <cstdint>
@@ -36,6 +37,9 @@ struct HeadingHypothesesParams
   /** All faults, one a line; empty when the parameters are usable. */
   std::vector<std::string> validate() const;
 };
+
+/** Names, units and ranges of these parameters, by which validate() checks them. */
+std::vector<Parameter> parameters(HeadingHypothesesParams& params);
 
 /** A place where the stored view may have been taken. */
 struct HeadingHypothesis

@@ -3,6 +3,7 @@
 #pragma once
 
 #include "view_servo/geometry/correspondence.h"
+#include "view_servo/parameters/parameter.h"
 
 #include <cstddef>
 #include <optional>
@@ -31,6 +32,9 @@ struct HeadingVoteParams
   /** All faults, one a line; empty when the parameters are usable. */
   std::vector<std::string> validate() const;
 };
+
+/** Names, units and ranges of these parameters, by which validate() checks them. */
+std::vector<Parameter> parameters(HeadingVoteParams& params);
 
 /**
  * Votes for the direction to the stored view (thesis 5.2). Each match gives the line through its reference and its

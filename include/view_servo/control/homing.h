@@ -10,7 +10,8 @@
 #include "view_servo/control/odometry_history.h"
 #include "view_servo/control/velocity_limiter.h"
 #include "view_servo/geometry/camera.h"
-#include "view_servo/geometry/planar_motion.h"
+#include "view_servo/geometry/planar_pose.h"
+#include "view_servo/parameters/parameter.h"
 #include "view_servo/tracking/view_tracker.h"
 
 #include <opencv2/core/mat.hpp>
@@ -59,6 +60,9 @@ struct HomingParams
   /** All faults, one a line; empty when the parameters are usable. */
   std::vector<std::string> validate() const;
 };
+
+/** Names, units and ranges of these parameters, by which validate() checks them. */
+std::vector<Parameter> parameters(HomingParams& params);
 
 enum class HomingState
 {

@@ -5,6 +5,7 @@
 #include "view_servo/control/goal_rules.h"
 #include "view_servo/control/velocity_limiter.h"
 #include "view_servo/geometry/euclidean_homography.h"
+#include "view_servo/parameters/parameter.h"
 
 #include <Eigen/Core>
 
@@ -33,6 +34,9 @@ struct Servo25dParams
   /** All faults, one a line; empty when the parameters are usable. */
   std::vector<std::string> validate() const;
 };
+
+/** Names, units and ranges of these parameters, by which validate() checks them. */
+std::vector<Parameter> parameters(Servo25dParams& params);
 
 /** What has to be brought to its place. */
 struct ServoTarget

@@ -2,6 +2,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include "view_servo/parameters/parameter.h"
+
 #include <Eigen/Core>
 
 #include <algorithm>
@@ -27,6 +29,9 @@ struct VelocityLimits
   /** All faults, one a line; empty when the parameters are usable. */
   std::vector<std::string> validate() const;
 };
+
+/** Names, units and ranges of these parameters, by which validate() checks them. */
+std::vector<Parameter> parameters(VelocityLimits& params);
 
 /** What a camera in an arm's hand may do, unless told otherwise. */
 inline const VelocityLimits ARM_LIMITS{ 0.15, 0.6, 0.5, 2.0 };

@@ -2,6 +2,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include "view_servo/parameters/parameter.h"
+
 #include <Eigen/Core>
 #include <opencv2/core/mat.hpp>
 
@@ -24,6 +26,9 @@ struct CornerParams
   /** All faults, one a line; empty when the parameters are usable. */
   std::vector<std::string> validate() const;
 };
+
+/** Names, units and ranges of these parameters, by which validate() checks them. */
+std::vector<Parameter> parameters(CornerParams& params);
 
 /** A corner: sub-pixel position [px], (0, 0) at the centre of the top-left pixel. */
 struct Corner

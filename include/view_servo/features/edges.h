@@ -2,6 +2,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include "view_servo/parameters/parameter.h"
+
 #include <Eigen/Core>
 #include <opencv2/core/mat.hpp>
 
@@ -21,6 +23,12 @@ struct EdgeParams
   /** All faults, one a line; empty when the parameters are usable. */
   std::vector<std::string> validate() const;
 };
+
+/** Names, units and ranges of these parameters, by which validate() checks them. */
+std::vector<Parameter> parameters(EdgeParams& params);
+
+/** The rows of those that LineSegmentParams has as well. */
+std::vector<Parameter> edgeParameters(double& sigma, double& low_threshold, double& high_threshold);
 
 /**
  * Points of an edge one after the other, with the brighter side on the left of somebody who walks along them and looks

@@ -3,6 +3,7 @@
 #pragma once
 
 #include "view_servo/geometry/line_segment.h"
+#include "view_servo/parameters/parameter.h"
 
 #include <opencv2/core/mat.hpp>
 
@@ -36,6 +37,9 @@ struct LineSegmentParams
   /** All faults, one a line; empty when the parameters are usable. */
   std::vector<std::string> validate() const;
 };
+
+/** Names, units and ranges of these parameters, by which validate() checks them. */
+std::vector<Parameter> parameters(LineSegmentParams& params);
 
 /**
  * The line segments of an image, longest first, each directed by its contrast: the brighter side is on the left of

@@ -3,6 +3,7 @@
 #pragma once
 
 #include "view_servo/features/corners.h"
+#include "view_servo/parameters/parameter.h"
 
 #include <opencv2/core/mat.hpp>
 
@@ -31,6 +32,9 @@ struct ProfileParams
   /** All faults, one a line; empty when the parameters are usable. */
   std::vector<std::string> validate() const;
 };
+
+/** Names, units and ranges of these parameters, by which validate() checks them. */
+std::vector<Parameter> parameters(ProfileParams& params);
 
 /**
  * The intensity profiles of an image, each pair of corners once, in the direction `start` -> `end`.

@@ -30,7 +30,7 @@ Eigen::Matrix3d crossMatrix(const Eigen::Vector3d& v);
 /** The up to ten essential matrices of exactly five correspondences (Nistér 2004). */
 std::vector<Eigen::Matrix3d> essentialFromFivePoints(const Correspondences& five);
 
-/** The four motions of an essential matrix; of these, points lie in front of both cameras for one at most. */
+/** The four motions that give an essential matrix; with at most one of them, points lie in front of both cameras. */
 std::vector<RelativePose> posesFromEssential(const Eigen::Matrix3d& essential);
 
 /**

@@ -32,33 +32,35 @@ struct EuclideanHomography
 Eigen::Matrix3d nearestRotation(const Eigen::Matrix3d& matrix);
 
 /**
- * H in normalised coordinates, scaled to R + (t / d) nᵀ: its middle singular value is 1, and points seen lie in front.
+ * H in normalised coordinates, scaled to R + (t / d) nᵀ: the middle singular value is 1, and the sign is the one with
+ * which most of `seen` lie in front of the current camera.
  * @param h x_cur ~ H x_ref, 3x3, in pixels, any scale. @param k camera matrix of both images.
  * @param seen points of the reference image that lie on the plane [px]; not empty.
  */
 Eigen::Matrix3d calibratedHomography(const Eigen::Matrix3d& h, const Eigen::Matrix3d& k, const Points& seen);
 
 /**
- * The motion between two cameras that see a plane of known normal: what a homography does along the plane is the rotation
- * alone, however short the translation is.
- * @param calibrated of calibratedHomography(). @param normal unit vector in the reference camera's frame.
+ * The motion between two cameras that see a plane of known normal. Directions within the plane are mapped by the
+ * rotation alone, so that the result is well defined however short the translation is.
+ * @param calibrated from calibratedHomography(). @param normal unit vector in the reference camera's frame.
  */
 EuclideanHomography motionBefore(const Eigen::Matrix3d& calibrated, const Eigen::Vector3d& normal);
 
 /**
  * The homography after the current camera has moved on (thesis eq. 8.3).
- * @param motion X_next = motion X_cur [m]. @param distance d, of the plane from the reference camera [m]; infinity when it
- * is not known: then only the turn counts.
+ * @param motion X_next = motion X_cur [m].
+ * @param distance d, of the plane from the reference camera [m]; infinity when it is not known, and then only the
+ * rotation of the motion is applied.
  */
 EuclideanHomography movedOn(const EuclideanHomography& homography, const Eigen::Isometry3d& motion, double distance);
 
 /**
- * The motions and planes that a homography can come from: of the two physical decompositions those before whose plane all
- * points lie, in both cameras. Two remain as a rule where the view does not change much; nothing in a single homography
- * tells which is true. Where the camera has only turned there is one, with a translation of zero and the normal NaN.
+ * The motions and planes that a homography can come from: those decompositions with all of `seen` in front of both
+ * cameras. As a rule two remain when the view changes little, and a single homography does not tell which is true. When
+ * the camera has only rotated there is one, with translation zero and a normal of NaN.
  * @param h x_cur ~ H x_ref, 3x3, in pixels, any scale. @param k camera matrix of both images.
  * @param seen points of the reference image that lie on the plane [px]; not empty.
- * @return none when no decomposition has all points in front of the cameras, as when H is no homography of a plane.
+ * @return empty when no decomposition has all points in front, as when H is not the homography of a plane.
  */
 std::vector<EuclideanHomography> decomposeHomography(const Eigen::Matrix3d& h, const Eigen::Matrix3d& k,
                                                      const Points& seen);

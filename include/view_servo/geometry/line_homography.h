@@ -12,11 +12,14 @@
 namespace view_servo
 {
 /** @file
- * Plane homographies and line segments. H maps the reference image to the current one, `x_cur ~ H x_ref`, and so lines
- * by `l_ref ~ Hᵀ l_cur`. Of a segment its line is well known and its end points are not: errors are measured across.
+ * Plane homographies and line segments. H maps points of the reference image to the current one, `x_cur ~ H x_ref`, and
+ * lines the other way, `l_ref ~ Hᵀ l_cur`. The line of a segment is measured well but its end points are not, so errors
+ * are distances across the segment.
  */
 
-/** The same physical line seen in the two views; the segments have the same sense but may show different parts of it. */
+/**
+ * The same physical line seen in the two views; the segments have the same sense but may show different parts of it.
+ */
 struct SegmentPair
 {
   Segment reference;
@@ -26,13 +29,14 @@ struct SegmentPair
 using SegmentPairs = std::vector<SegmentPair>;
 
 /**
- * Homography of n >= 4 lines (thesis 2.5): the one of least squared distances of the mapped reference end points from the
- * current lines, each times the point's third coordinate, with isotropic normalisation. H has third coordinate 1 at the
- * mean of the reference segments' midpoints. Empty when the lines do not determine it (four parallel, or concurrent).
+ * Homography of n >= 4 lines (thesis 2.5), by linear least squares with isotropic normalisation: minimises the squared
+ * distances of the mapped reference end points from the current lines, each multiplied by the point's third coordinate.
+ * H is scaled to third coordinate 1 at the mean of the reference segments' midpoints. Empty when the lines do not
+ * determine it (four parallel, or concurrent).
  */
 std::optional<Eigen::Matrix3d> homographyFromLines(const SegmentPairs& pairs);
 
-/** As homographyFromLines(), with an affine map: n >= 3 lines. */
+/** The same for an affine map: n >= 3 lines. */
 std::optional<Eigen::Matrix3d> affinityFromLines(const SegmentPairs& pairs);
 
 /** How much a local affine map may distort; s1 >= s2 are the singular values of its linear part. */
@@ -50,10 +54,10 @@ struct AffinityLimits
 std::optional<Eigen::Matrix3d> plausibleAffinity(const Eigen::Vector2d* from, const Eigen::Vector2d* to,
                                                  const double* weights, int n, const AffinityLimits& limits);
 
-/** The segment that H makes of one. Empty where an end point maps to or beyond infinity (third coordinate < 0.1). */
+/** The segment mapped by H; empty when an end point maps near or beyond infinity (third coordinate < 0.1). */
 std::optional<Segment> transfer(const Eigen::Matrix3d& h, const Segment& segment);
 
-/** How two segments lie to each other. */
+/** How two segments in one image lie relative to each other. */
 struct SegmentAgreement
 {
   double distance;  ///< largest distance between them, across, where they lie side by side [px]
@@ -62,7 +66,7 @@ struct SegmentAgreement
   double share;     ///< length side by side over the length that both cover, in [0, 1]
 };
 
-/** Compares segments by what they share. Distance is infinite where they do not lie side by side. */
+/** Compares two segments; the distance is infinite when no parts of them lie side by side. */
 SegmentAgreement compare(const Segment& a, const Segment& b);
 
 }  // namespace view_servo

@@ -8,7 +8,9 @@
 
 namespace view_servo
 {
-/** Third component of the cross product of two plane vectors: positive when b lies in the sense of +90 degrees from a. */
+/**
+ * Third component of the cross product of two vectors in the plane: positive when a turns to b by 0 to +180 degrees.
+ */
 inline double cross(const Eigen::Vector2d& a, const Eigen::Vector2d& b)
 {
   return a.x() * b.y() - a.y() * b.x();
@@ -35,8 +37,8 @@ struct Segment
     return (end - start) / length();
   }
   /**
-   * Unit normal (direction turned by +90 degrees, which in an image with v down is clockwise): it points to the right
-   * of somebody who walks from start to end and looks at the image.
+   * Unit normal: the direction turned by +90 degrees, which is clockwise in an image with v down. In the picture it
+   * points to the right of the way from start to end.
    */
   Eigen::Vector2d normal() const
   {

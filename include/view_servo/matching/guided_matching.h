@@ -4,6 +4,7 @@
 
 #include "view_servo/features/corners.h"
 #include "view_servo/matching/association.h"
+#include "view_servo/parameters/parameter.h"
 
 #include <Eigen/Core>
 #include <opencv2/core/mat.hpp>
@@ -22,6 +23,9 @@ struct GuidedParams
   /** All faults, one a line; empty when the parameters are usable. */
   std::vector<std::string> validate() const;
 };
+
+/** Names, units and ranges of these parameters, by which validate() checks them. */
+std::vector<Parameter> parameters(GuidedParams& params);
 
 /** A reference corner found again in the current image. */
 struct GuidedMatch

@@ -4,6 +4,7 @@
 
 #include "view_servo/geometry/line_segment.h"
 #include "view_servo/matching/line_groups.h"
+#include "view_servo/parameters/parameter.h"
 
 #include <Eigen/Core>
 #include <opencv2/core/mat.hpp>
@@ -28,6 +29,9 @@ struct LineFeatureParams
   /** All faults, one a line; empty when the parameters are usable. */
   std::vector<std::string> validate() const;
 };
+
+/** Names, units and ranges of these parameters, by which validate() checks them. */
+std::vector<Parameter> parameters(LineFeatureParams& params);
 
 /**
  * The line segments of an image with all that matching asks of them: which lies near which, where their lines meet,

@@ -4,6 +4,7 @@
 
 #include "view_servo/geometry/line_segment.h"
 #include "view_servo/matching/association.h"
+#include "view_servo/parameters/parameter.h"
 
 #include <Eigen/Core>
 
@@ -48,6 +49,9 @@ struct LineGroupParams
   /** All faults, one a line; empty when the parameters are usable. */
   std::vector<std::string> validate() const;
 };
+
+/** Names, units and ranges of these parameters, by which validate() checks them. */
+std::vector<Parameter> parameters(LineGroupParams& params);
 
 /** Number of pair indices: four signs, to base 3. */
 constexpr int PAIR_INDICES = 81;

@@ -4,6 +4,7 @@
 
 #include "view_servo/matching/association.h"
 #include "view_servo/matching/line_features.h"
+#include "view_servo/parameters/parameter.h"
 
 #include <Eigen/Core>
 
@@ -35,6 +36,9 @@ struct LineRegionParams
   /** All faults, one a line; empty when the parameters are usable. */
   std::vector<std::string> validate() const;
 };
+
+/** Names, units and ranges of these parameters, by which validate() checks them. */
+std::vector<Parameter> parameters(LineRegionParams& params);
 
 /** A segment and its counterpart, by their indices. */
 struct SegmentMatch

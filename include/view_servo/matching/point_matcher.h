@@ -7,6 +7,7 @@
 #include "view_servo/matching/assignment.h"
 #include "view_servo/matching/association.h"
 #include "view_servo/matching/profile_index.h"
+#include "view_servo/parameters/parameter.h"
 
 #include <opencv2/core/mat.hpp>
 
@@ -35,6 +36,9 @@ struct PointMatcherParams
   /** All faults, one a line; empty when the parameters are usable. */
   std::vector<std::string> validate() const;
 };
+
+/** Names, units and ranges of these parameters, by which validate() checks them. */
+std::vector<Parameter> parameters(PointMatcherParams& params);
 
 /** What matching needs to know of one image. */
 struct PointFeatures

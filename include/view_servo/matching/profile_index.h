@@ -3,6 +3,7 @@
 #pragma once
 
 #include "view_servo/features/profiles.h"
+#include "view_servo/parameters/parameter.h"
 
 #include <memory>
 #include <string>
@@ -28,6 +29,9 @@ struct ProfileSearchParams
   /** All faults, one a line; empty when the parameters are usable. */
   std::vector<std::string> validate() const;
 };
+
+/** Names, units and ranges of these parameters, by which validate() checks them. */
+std::vector<Parameter> parameters(ProfileSearchParams& params);
 
 /** A reference profile found similar to a current one. */
 struct ProfileMatch

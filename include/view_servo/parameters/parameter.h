@@ -3,7 +3,9 @@
 #pragma once
 
 #include <cstdint>
+#include <filesystem>
 #include <functional>
+#include <initializer_list>
 #include <string>
 #include <utility>
 #include <vector>
@@ -11,27 +13,36 @@
 namespace view_servo
 {
 /**
- * A parameter by its name, as yaml files, the parameter server and `--set name=value` give it. One table serves all
- * three and the reference in docs/, so a name means the same everywhere.
+ * A parameter, stated once: a table of these is what yaml files, the parameter server and `--set name=value` are read by,
+ * what values are checked by, and what docs/parameters.md and the files in config/ are compared with.
  */
 struct Parameter
 {
   std::string name;
-  std::string type;         ///< "int", "double", "bool" or the allowed words, joined by '|'
-  std::string description;  ///< with unit and range
+  std::string type;  ///< "int", "double", "bool", "string" or the allowed words, joined by '|'
+  std::string unit;  ///< such as "px" or "rad/s"; empty: none
+  /**
+   * The allowed values of a number: "> 0", ">= 1", "[0, 1)", "(0, pi/2)", "4, 6 or 8", "odd, >= 5"; or, by another
+   * parameter of the same table, ">= gain". Empty: all finite ones.
+   */
+  std::string range;
+  std::string description;
   std::function<std::string()> get;
-  /** Parses and stores; false (and nothing stored) when the text is not of the type. */
+  /** Parses and stores; returns false, and stores nothing, when the text is not of the type. Ranges are faultsOf()'s to check. */
   std::function<bool(const std::string&)> set;
+  std::function<double()> number;  ///< the value of an "int" or a "double"; empty for other types
 };
 
 /** @file
- * Rows of such tables, bound to `value`, which must outlive them. Texts are parsed whatever the locale.
+ * Rows of such tables, bound to `value`, which must outlive them. Texts are parsed alike whatever the locale.
  */
-Parameter integer(std::string name, int& value, std::string description);
+Parameter integer(std::string name, int& value, std::string unit, std::string range, std::string description);
 /** Finite numbers only. */
-Parameter real(std::string name, double& value, std::string description);
+Parameter real(std::string name, double& value, std::string unit, std::string range, std::string description);
 Parameter natural(std::string name, std::uint64_t& value, std::string description);
 Parameter boolean(std::string name, bool& value, std::string description);
+Parameter text(std::string name, std::string& value, std::string description);
+Parameter path(std::string name, std::filesystem::path& value, std::string description);
 
 /** A choice among words; booleans are the words true and false. */
 template <typename T>
@@ -63,7 +74,34 @@ Parameter choice(std::string name, T& value, std::vector<std::pair<std::string, 
     }
     return false;
   };
-  return { std::move(name), type, std::move(description), get, set };
+  return { std::move(name), type, "", "", std::move(description), get, set, nullptr };
+}
+
+/** The name in the table that is spelt most like `name`, for messages; empty for an empty table. */
+std::string nearestName(const std::vector<Parameter>& table, const std::string& name);
+
+/**
+ * Sets one parameter by its name. Ranges are faultsOf()'s to check.
+ * @throws std::invalid_argument naming the parameter when it is unknown (with the nearest name) or the value does not
+ * parse; nothing is changed then.
+ */
+void setParameter(const std::vector<Parameter>& table, const std::string& name, const std::string& value);
+
+/** Tables one after the other. */
+std::vector<Parameter> joined(std::initializer_list<std::vector<Parameter>> tables);
+
+/**
+ * What is wrong with the values, one text for each: numbers that are not finite or out of their range, and choices that are
+ * none of the words.
+ * @throws std::logic_error when a range cannot be read.
+ */
+std::vector<std::string> faultsOf(const std::vector<Parameter>& table);
+
+/** Those of the table that `parameters(Params&)` makes, a function beside the type. */
+template <typename Params>
+std::vector<std::string> faultsOf(Params params)
+{
+  return faultsOf(parameters(params));
 }
 
 }  // namespace view_servo

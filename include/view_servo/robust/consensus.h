@@ -6,25 +6,28 @@
 
 namespace view_servo
 {
-/** How the RANSAC loop measures what data say of a model. */
+/** How the RANSAC loop measures the support of a model by the data. */
 template <typename Model>
 class Consensus
 {
 public:
   virtual ~Consensus() = default;
 
-  /** Smaller is better; infinite as soon as the cost is seen not to be below `limit`. */
+  /**
+   * The smaller the better. May return infinity as soon as it is certain, or nearly so, that the cost is not below
+   * `limit`.
+   */
   virtual double cost(const Model& model, double limit) = 0;
 
-  /** The data that support a model, ascending, when the threshold is taken `width` times as large. */
+  /** Sets `inliers` to the data that support a model, ascending, with the inlier threshold multiplied by `width`. */
   virtual void findInliers(const Model& model, double width, std::vector<int>& inliers) = 0;
 
-  /** Told the inliers of the best sample so far. */
+  /** Called with the inliers of each new best sample, by which later models can be rejected sooner. */
   virtual void setBest(const std::vector<int>& /*inliers*/)
   {
   }
 
-  /** Of a result without a model. */
+  /** The cost in a result without a model. */
   virtual double costOfNone() const = 0;
 };
 

@@ -17,8 +17,9 @@ public:
   static constexpr int SAMPLE_SIZE = 7;
 
   /**
-   * Keeps a reference to `pairs`, which must outlive the estimator. With a positive `view_consistency_threshold`
-   * samples are refused whose first or last five points violate the view constraint by more (thesis 6.3, method 2).
+   * Keeps a reference to `pairs`, which must outlive the estimator.
+   * @param view_consistency_threshold samples are refused when viewConstraint() of their first or last five points is
+   * larger (thesis 6.3, method 2); 0: no such test.
    */
   explicit FundamentalEstimator(const Correspondences& pairs, double view_consistency_threshold = 0.0)
     : pairs_(pairs), view_consistency_threshold_(view_consistency_threshold)

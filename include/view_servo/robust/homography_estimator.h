@@ -9,7 +9,7 @@
 
 namespace view_servo
 {
-/** Homography of a plane (reference -> current) from four points, for ransac(); error = transfer into both images. */
+/** Homography of a plane (x_cur ~ H x_ref) from four points, for ransac(); error = transfer into both images [px²]. */
 class HomographyEstimator
 {
 public:

@@ -11,9 +11,9 @@
 namespace view_servo
 {
 /**
- * Homography of a plane (reference -> current) from four lines, for ransac() (thesis 4.7.1). The error is that of
- * segments, not of lines: how far they lie apart, across, where they lie side by side. The thesis compares the lines'
- * angles and distances from the origin, and found its thresholds fragile.
+ * Homography of a plane (x_cur ~ H x_ref) from four lines, for ransac() (thesis 4.7.1). The error compares segments,
+ * not infinite lines: it is the distance across between the segments, where they lie side by side. The thesis compares
+ * the angles of lines and their distances from the origin instead, and found the thresholds for these fragile.
  */
 class LineHomographyEstimator
 {

@@ -4,6 +4,7 @@
 
 #include "view_servo/geometry/correspondence.h"
 #include "view_servo/matching/association.h"
+#include "view_servo/parameters/parameter.h"
 #include "view_servo/robust/fundamental_estimator.h"
 #include "view_servo/robust/homography_estimator.h"
 #include "view_servo/robust/ransac.h"
@@ -15,8 +16,8 @@
 namespace view_servo
 {
 /** @file
- * Robust estimation that does not commit itself to one match a point (thesis ch. 9): a model is supported by the best
- * one-to-one matching among all entries of the association matrix that agree with it.
+ * Robust estimation in which each point keeps several candidate matches (thesis ch. 9). The support of a model is the
+ * best one-to-one matching among those entries of the association matrix that agree with the model.
  */
 
 enum class HypothesisSampling
@@ -29,26 +30,30 @@ enum class HypothesisSampling
 struct MultiHypothesisParams
 {
   HypothesisSampling sampling = HypothesisSampling::CANDIDATES;
-  int entries_per_row = 10;         ///< strongest associations of a reference point that are kept (9.5), >= 1
-  double association_weight = 3.0;  ///< lambda of 9.6.3: of the strongest association, beside the fit [px], >= 0
+  int entries_per_row = 10;         ///< associations kept of each reference point, the strongest (9.5), >= 1
+  double association_weight = 3.0;  ///< lambda of 9.6.3: what the strongest association adds to a match [px], >= 0
 
   /** All faults, one a line; empty when the parameters are usable. */
   std::vector<std::string> validate() const;
 };
 
+/** Names, units and ranges of these parameters, by which validate() checks them. */
+std::vector<Parameter> parameters(MultiHypothesisParams& params);
+
 template <typename Model>
 struct MultiHypothesisResult
 {
   std::optional<Model> model;        ///< empty: no sample gave one
-  std::vector<Association> matches;  ///< one-to-one, that agree with the model, in the order of rows
+  std::vector<Association> matches;  ///< one-to-one, all agree with the model, in the order of rows
   RansacStatistics statistics;
 };
 
 /**
- * Fundamental matrix (x_curᵀ F x_ref = 0) from an association of `reference` (rows) with `current` points (columns).
- * An entry agrees when its Sampson distance is under ransac.inlier_threshold, T; the matching maximises the sum of
- * T - distance + lambda a / max a; the support is the number of matches, then that sum. ransac.improvement_stage is N2 of
- * Algorithm 2. ransac.sampling is for CANDIDATES.
+ * Fundamental matrix (x_curᵀ F x_ref = 0) from an association of `reference` (rows) with `current` points (columns). An
+ * entry agrees with F when its Sampson distance is under T = ransac.inlier_threshold. The matching maximises the sum of
+ * T - distance + lambda a / max a, with a the weight of an entry. Models are compared by the number of matches, then by
+ * that sum. ransac.improvement_stage adds the N2 replacements of Algorithm 2; ransac.sampling is used for CANDIDATES
+ * only.
  * @param view_consistency_threshold as in FundamentalEstimator.
  * @throws std::invalid_argument when the sizes of the association are not those of the lists.
  */
@@ -58,7 +63,7 @@ MultiHypothesisResult<FundamentalEstimator::Model> estimateFundamental(const Ass
                                                                        const MultiHypothesisParams& params, Rng& rng,
                                                                        double view_consistency_threshold = 0.0);
 
-/** Homography (x_cur ~ H x_ref) likewise, with the RMS transfer error of the two images. */
+/** Homography (x_cur ~ H x_ref) in the same way; the distance is the RMS of the transfer errors in the two images. */
 MultiHypothesisResult<HomographyEstimator::Model> estimateHomography(const AssociationMatrix& association,
                                                                      const Points& reference, const Points& current,
                                                                      const RansacParams& ransac,

@@ -10,7 +10,7 @@
 
 namespace view_servo
 {
-/** A motion on the floor, with what is asked of it for every datum. */
+/** A motion on the floor, with the matrices by which every datum is scored. */
 struct PlanarMotion
 {
   PlanarPose pose;           ///< of the reference camera in the current one, of distance 1
@@ -28,8 +28,9 @@ struct PlanarMotion
 };
 
 /**
- * Motion on the floor between two level cameras, from two correspondences of level points, for ransac(). Error = squared Sampson distance, in units of the points;
- * infinite for points that would lie behind a camera. So the threshold is in these units, too.
+ * Motion on the floor between two level cameras, from two correspondences of level points (see CameraMount), for
+ * ransac(). Error = squared Sampson distance, infinite for points that would lie behind a camera. Errors, and with them
+ * the inlier threshold, are in units of the level points.
  */
 class PlanarMotionEstimator
 {
@@ -37,7 +38,10 @@ public:
   using Model = PlanarMotion;
   static constexpr int SAMPLE_SIZE = 2;
 
-  /** Keeps a reference to `pairs`, which must outlive the estimator. @param max_yaw largest turn looked for [rad]. */
+  /**
+   * Keeps a reference to `pairs`, which must outlive the estimator.
+   * @param max_yaw motions with a larger |yaw| are dropped [rad].
+   */
   PlanarMotionEstimator(const Correspondences& pairs, double max_yaw) : pairs_(pairs), max_yaw_(max_yaw)
   {
   }
@@ -57,8 +61,8 @@ private:
 };
 
 /**
- * Pose on the floor from two sightings of landmarks, for ransac(): pose of the reference camera in the current one.
- * Error = squared distance in the current image, in units of the points.
+ * Pose on the floor of the reference camera in the current one, from two sightings of landmarks, for ransac().
+ * Error = squared distance in the current image, in units of the level points; infinite behind the camera.
  */
 class PlanarPoseEstimator
 {

@@ -2,6 +2,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include "view_servo/parameters/parameter.h"
 #include "view_servo/robust/consensus.h"
 #include "view_servo/robust/random.h"
 #include "view_servo/robust/sampler.h"
@@ -27,6 +28,9 @@ struct RansacParams
   /** All faults, one a line; empty when the parameters are usable. */
   std::vector<std::string> validate() const;
 };
+
+/** Names, units and ranges of these parameters, by which validate() checks them. */
+std::vector<Parameter> parameters(RansacParams& params);
 
 enum class RansacStop
 {
@@ -72,7 +76,7 @@ struct RansacResult
 template <typename Estimator>
 RansacResult<typename Estimator::Model> ransac(const Estimator& estimator, const RansacParams& params, Rng& rng);
 
-/** The same with samples from elsewhere and support measured otherwise; params.sampling has no meaning then. */
+/** The same with a given source of samples and a given measure of support; params.sampling is not used. */
 template <typename Estimator>
 RansacResult<typename Estimator::Model> ransac(const Estimator& estimator, Sampler& sampler,
                                                Consensus<typename Estimator::Model>& consensus,

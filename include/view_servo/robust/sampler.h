@@ -16,16 +16,16 @@ class Sampler
 public:
   virtual ~Sampler() = default;
 
-  /** Replaces `sample`; false when none can be drawn. */
+  /** Sets `sample` to a new one; false when none can be drawn. */
   virtual bool draw(Rng& rng, std::vector<int>& sample) = 0;
 
-  /** Probability that a datum drawn is one of `inliers` (ascending), for the adaptive stop (thesis eq. 9.5). */
+  /** Probability that a datum drawn belongs to `inliers` (ascending), for the adaptive stop (thesis eq. 9.5). */
   virtual double share(const std::vector<int>& inliers) const = 0;
 
-  /** How many data each position of the best sample is tried with in the improvement stage (thesis 9.4). */
+  /** Number of candidates that the improvement stage (thesis 9.4) tries at each position of the best sample. */
   virtual int replacements() const = 0;
 
-  /** Puts the trial-th of these into a place of a sample; false when it has no place there. */
+  /** Replaces the sample's entry at `position` by candidate number `trial`; false if there is none that fits there. */
   virtual bool replace(Rng& rng, int trial, std::size_t position, std::vector<int>& sample) const = 0;
 };
 
@@ -36,8 +36,8 @@ enum class Sampling
 };
 
 /**
- * Samples from a list: uniform, or from a growing best-first prefix (PROSAC; Chum & Matas 2005, sec. 2.1). The growth
- * is that of the paper with its T_N set to `schedule_length`; when it is through, samples are uniform over the list.
+ * Samples from a list: uniform, or from a growing best-first prefix (PROSAC; Chum & Matas 2005, sec. 2.1). The prefix
+ * grows as in the paper, with T_N = `schedule_length`; once it is the whole list, samples are uniform.
  */
 class ListSampler : public Sampler
 {
@@ -45,7 +45,7 @@ public:
   /** From the data 0 .. count - 1, in this order. @param size of a sample, > 0. */
   ListSampler(Sampling sampling, std::size_t count, std::size_t size, double schedule_length);
 
-  /** From these data, in this order. */
+  /** From the given data, in their order. */
   ListSampler(Sampling sampling, std::vector<int> data, std::size_t size, double schedule_length);
 
   bool draw(Rng& rng, std::vector<int>& sample) override;
@@ -75,7 +75,7 @@ class ImportanceSampler : public Sampler
 public:
   /**
    * Keeps a reference to the association.
-   * @param size of a sample, > 0. @param replacements entries drawn for each position of the best sample (N2).
+   * @param size of a sample, > 0. @param replacements see replacements(); N2 of Algorithm 2.
    */
   ImportanceSampler(const AssociationMatrix& association, std::size_t size, int replacements);
 
@@ -89,13 +89,13 @@ public:
 
 private:
   int drawEntry(Rng& rng) const;
-  /** Whether an entry shares a row or column with one of a sample, but for that at `except`. */
+  /** Whether an entry shares a row or column with an entry of the sample, the one at `except` left aside. */
   bool collides(int entry, const std::vector<int>& sample, std::size_t except) const;
 
   const AssociationMatrix& association_;
   std::size_t size_;
   int replacements_;
-  std::vector<double> cumulated_;  ///< weights up to and with each entry
+  std::vector<double> cumulated_;  ///< sums of the weights from the first entry to each one
 };
 
 namespace detail

@@ -7,15 +7,17 @@
 namespace view_servo
 {
 /**
- * -log10 of the number of models with this many inliers to be expected among matches made by chance (a-contrario,
- * Moisan & Stival 2004): (n - s) C(n, k) C(k, s) p^(k - s), with p the probability that a random match agrees.
+ * -log10 of the expected number of models with as many inliers when all matches are made by chance (a-contrario, Moisan
+ * & Stival 2004): (n - s) C(n, k) C(k, s) p^(k - s), for n candidates, k inliers and samples of s.
+ * @param probability p, that a match made by chance agrees with a model.
  */
 double logSignificance(std::size_t candidates, std::size_t inliers, int sample_size, double probability);
 
 /**
- * How often the reference position of one inlier and the current one of another agree, too. Often, when the positions
- * lie along an epipolar line, say the edge of a floor: then they agree whatever they are matched with.
- * @param agrees bool(std::size_t reference, std::size_t current).
+ * The share of wrong pairs, made of one inlier's reference position and another inlier's current position, that agree
+ * with the model as well. It is large when the positions lie along one epipolar line, such as the edge of a floor:
+ * these agree with whatever they are matched.
+ * @param agrees bool(std::size_t reference, std::size_t current), both indices of inliers.
  */
 template <typename Agrees>
 double chanceAmong(std::size_t inliers, const Agrees& agrees)

@@ -3,6 +3,7 @@
 #pragma once
 
 #include "view_servo/geometry/correspondence.h"
+#include "view_servo/parameters/parameter.h"
 #include "view_servo/robust/ransac.h"
 
 #include <array>
@@ -12,7 +13,7 @@ namespace view_servo
 {
 /**
  * Violation, in [0, 1], of the view constraint on five points seen in two scaled-orthographic views (thesis eq. 6.5,
- * 6.6; Carlsson 2000): zero for exact data, whatever the scales. The printed constraint depends on the units; here each
+ * 6.6; Carlsson 2000): zero for exact data, whatever the scales. As printed it depends on the units; here each
  * view's points are normalised (centroid 0, RMS distance 1) and the determinant is divided by the lengths of its rows.
  * Degenerate groups (all points coincide in a view, or a row vanishes, as it does for points on one plane) return 1.
  */
@@ -27,6 +28,9 @@ struct ViewConsistencyParams
   /** All faults, one a line; empty when the parameters are usable. */
   std::vector<std::string> validate() const;
 };
+
+/** Names, units and ranges of these parameters, by which validate() checks them. */
+std::vector<Parameter> parameters(ViewConsistencyParams& params);
 
 /**
  * Thesis 6.3, method 1: counts how often each candidate takes part in a view-consistent group of five drawn at random,

@@ -18,17 +18,24 @@ namespace view_servo
  * Between the core's types for an arm and messages.
  */
 
-/** What a valid homography says. @throws std::runtime_error naming a number that is out of the range that Homography.msg states. */
+/**
+ * A valid homography as servoing takes it. @throws std::runtime_error naming a number outside the range in
+ * Homography.msg.
+ */
 PlaneView toPlaneView(const Homography& message);
 
 /**
- * What servoing does after an image. Errors are NaN unless it drives or has converged.
- * @param header of the image. @param distance_known whether the plane's distance is known, so that translations are metres.
+ * The errors of servoing after an image. They are NaN unless servoing drives or has converged.
+ * @param header of the image. @param distance_known whether the plane's distance is known, so that translations are in
+ * metres.
  */
 ServoError toServoError(const ServoReport& report, const ServoTarget& target, bool distance_known,
                         const std_msgs::Header& header);
 
-/** The limits of a URDF's joints by name [rad] or [m]; none, with a warning, when it cannot be read; none when it is empty. */
+/**
+ * The limits of a URDF's joints by name [rad] or [m]. None when the text is empty; none, with a warning, when it cannot
+ * be read.
+ */
 std::map<std::string, JointLimits> jointLimits(const std::string& urdf_xml);
 
 }  // namespace view_servo

@@ -7,7 +7,7 @@
 #include "view_servo/control/heading_vote.h"
 #include "view_servo/control/homing.h"
 #include "view_servo/control/velocity_limiter.h"
-#include "view_servo/geometry/planar_motion.h"
+#include "view_servo/geometry/planar_pose.h"
 
 #include <geometry_msgs/PoseStamped.h>
 #include <geometry_msgs/TwistStamped.h>
@@ -23,18 +23,18 @@ namespace view_servo
  * Between the core's types for a mobile base and messages.
  */
 
-/** The base on the floor, in odometry's frame; not finite where the message is not. */
+/** The base's pose on the floor in the odometry frame; not finite where the message is not. */
 PlanarPose toPlanarPose(const nav_msgs::Odometry& message);
 
 geometry_msgs::TwistStamped toTwistStamped(const BaseVelocity& velocity, const ros::Time& stamp,
                                            const std::string& base_frame);
 
-/** Matches with their scores as weights, in pixels; without those whose score is negative or no number. */
+/** Matches in pixels, weighted by their scores; those with a score that is negative or NaN are left out. */
 HeadingEvidence toHeadingEvidence(const std::vector<PointMatch>& matches);
 
 Heading toHeading(const HomingReport& report, const std::string& base_frame);
 
-/** The direction to the view for rviz: at the base, the x axis towards the view. */
+/** The direction to the view for rviz: a pose at the base with its x axis towards the view. */
 geometry_msgs::PoseStamped toHeadingArrow(const HomingReport& report, const std::string& base_frame);
 
 }  // namespace view_servo

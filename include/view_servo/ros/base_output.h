@@ -12,11 +12,14 @@
 
 namespace view_servo
 {
-/** What homing publishes besides its status: commands as Twist and TwistStamped, and the heading, with an arrow for rviz. */
+/**
+ * Publishes what homing sends besides its status: commands as Twist and TwistStamped, and the heading, with an arrow
+ * for rviz.
+ */
 class BaseOutput
 {
 public:
-  /** @param command_topic of the Twist; that of the TwistStamped has "_stamped" behind it. */
+  /** @param command_topic topic of the Twist; the TwistStamped goes to the same name with "_stamped" appended. */
   BaseOutput(ros::NodeHandle& nh, const std::string& command_topic, std::string base_frame);
 
   /** Publishes a command. */
@@ -24,8 +27,8 @@ public:
   /** Publishes the heading, and the arrow while there is one. */
   void publish(const HomingReport& report) const;
 
-  /** Whether somebody listens to commands. */
-  bool heard() const;
+  /** Whether somebody subscribes to commands. */
+  bool hasListener() const;
 
 private:
   std::string base_frame_;

@@ -29,24 +29,23 @@ struct CameraFrame
 
 struct CameraInputParams
 {
+  std::string image_transport = "raw";  // read by image_transport itself
   int queue_size = 5;
-  double max_image_age = 1.0;
-
-  static CameraInputParams read(ParameterReader& reader);
+  double max_image_age = 1.0;  // [s]
 };
+
+/** Names, units, ranges and meanings of these parameters. */
+std::vector<Parameter> parameters(CameraInputParams& params);
 
 /**
  * A node's camera: the newest image that comes with a calibration of the same stamp.
  *
  * Subscribes to `image_raw` (sensor_msgs/Image) and `camera_info` (sensor_msgs/CameraInfo), each of which can be
- * remapped by itself. Parameters:
- *  - `~image_transport` (string, default "raw"): how images travel;
- *  - `~queue_size` (int, default 5, >= 1): images that wait for their camera_info, and the other way round;
- *  - `~max_image_age` (double, default 1.0 [s], > 0): an older image is not the camera's present view.
+ * remapped by itself.
  *
  * A frame that cannot be used (camera not calibrated, or calibrated for another size) is dropped, with a throttled
- * error that names both topics; so are messages of which none have a common stamp. An image from the future is as bad
- * as an old one: time jumped back, as when a bag loops.
+ * error that names both topics. A similar error tells of images and camera_info that never have the same stamp. An
+ * image from the future is as bad as an old one: time jumped back, as when a bag loops.
  */
 class CameraInput
 {
@@ -54,8 +53,8 @@ public:
   using Callback = std::function<void(const CameraFrame&)>;
 
   /**
-   * Both are called from a spinner's thread, and have to be quick.
-   * @param on_frame called for every usable frame. @param on_problem called for every other one, with what is wrong.
+   * Both functions are called by a spinner's thread, and have to be quick.
+   * @param on_frame called with every usable frame. @param on_problem called for every other frame, with what is wrong.
    */
   CameraInput(const ros::NodeHandle& nh, const CameraInputParams& params, Callback on_frame = Callback(),
               std::function<void(const std::string&)> on_problem = {});
@@ -63,20 +62,23 @@ public:
   /** @throws ImageError, saying why, when there is no usable frame or it is too old. */
   CameraFrame latest() const;
 
-  /** What is wrong with latest(), in one line; empty: nothing, and `frame` is it. @param before frame that does not do. */
+  /**
+   * Sets `frame` to latest(). @param before a frame that does not count, as it was there before.
+   * @return why there is no such frame, in one line; empty when there is.
+   */
   std::string missing(CameraFrame& frame, const CameraFrame& before = CameraFrame()) const;
-  /** Why the newest image cannot be used with its calibration, whatever it shows; empty: it can, or none came. */
+  /** Why the newest image is not usable (see above), however old it is; empty when it is, or when none has come. */
   std::string fault() const;
 
   /**
-   * The same, as soon as there is one: a camera may start later than its node. The wait is by a steady clock, and logged.
-   * Only one caller waits at a time, and others are answered at once: who waits takes one of the spinner's few threads, and
-   * images come by them, too.
+   * Waits for latest(), as a camera may start later than its node. The wait is by a steady clock, and logged. Only one
+   * caller waits at a time; for others this is latest(). For a caller that waits blocks one of the spinner's few
+   * threads, which also deliver the images.
    * @param patience longest wait [s].
    */
   CameraFrame latest(double patience) const;
 
-  /** Where images come from, resolved. */
+  /** Resolved name of the topic that images come on. */
   std::string imageTopic() const
   {
     return image_subscriber_.getTopic();
@@ -86,7 +88,7 @@ public:
 
 private:
   void frameCallback(const sensor_msgs::ImageConstPtr& image, const sensor_msgs::CameraInfoConstPtr& info);
-  void take(const sensor_msgs::ImageConstPtr& image, const sensor_msgs::CameraInfoConstPtr& info);
+  void onPair(const sensor_msgs::ImageConstPtr& image, const sensor_msgs::CameraInfoConstPtr& info);
   std::string faultOf(const sensor_msgs::Image& image, const sensor_msgs::CameraInfo& info) const;
   void checkInputs();
   std::string topics() const;

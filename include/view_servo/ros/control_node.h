@@ -17,14 +17,15 @@
 namespace view_servo
 {
 /**
- * Whether a node may drive: off at start, switched by the service `~enable` (std_srvs/SetBool). With `~dry_run` (bool,
- * default false) commands go to other topics, whatever the gate says.
+ * Whether a node may drive: off at start, switched by the service `~enable` (std_srvs/SetBool). In a dry run
+ * commands go to other topics, whatever the gate says.
  */
 class CommandGate
 {
 public:
-  /** Reads `~dry_run`. */
-  explicit CommandGate(ParameterReader& reader);
+  explicit CommandGate(bool dry_run) : dry_run_(dry_run)
+  {
+  }
 
   std_srvs::SetBool::Response set(bool enabled);
 
@@ -43,7 +44,7 @@ public:
   }
 
 private:
-  bool dry_run_ = false;
+  bool dry_run_;
   std::atomic<bool> enabled_{ false };
 };
 
@@ -69,17 +70,17 @@ private:
 /** A status without errors or inliers, stamped now. */
 ServoStatus makeStatus(std::uint8_t state, const std::string& reason);
 
-/** That of a node without a goal. */
+/** The status of a node without a goal. */
 ServoStatus idleStatus(const CommandGate& gate);
 
-/** Whether idleStatus() has to be told, because the gate has been switched since the last status. */
+/** Whether idleStatus() has to be published because the gate was switched after the last status. */
 bool isOutdated(const ServoStatus& last, const CommandGate& gate);
 
 /** After a robot was moved, zeros are sent for some cycles, and then nothing, so that another node may drive it. */
 class StopBurst
 {
 public:
-  /** A command was sent. */
+  /** To be called when a command was sent. */
   void sent(bool zero)
   {
     count_ = zero ? count_ + 1 : 0;
@@ -99,13 +100,16 @@ private:
 
 namespace detail
 {
-/** Has SIGINT, SIGTERM and the master's order to shut down only ask for an end, so that a node can stop its robot first. */
+/**
+ * From now on SIGINT, SIGTERM and the master's order to shut down only make shutdownRequested() true, so that a node
+ * can stop its robot before ROS ends.
+ */
 void deferShutdown();
 bool shutdownRequested();
 }  // namespace detail
 
 /**
- * As runNode(), for a node that drives something: before ROS shuts down, its `stop()` is called, which sends zero.
+ * As runNode(), for a node that drives a robot: its `stop()`, which sends zero, is called before ROS shuts down.
  * @return 1 when the node refuses to start.
  */
 template <typename Node>

@@ -9,7 +9,7 @@
 #include "view_servo/geometry/camera.h"
 #include "view_servo/geometry/line_segment.h"
 #include "view_servo/tracking/plane_tracker.h"
-#include "view_servo/views/point_view_matcher.h"
+#include "view_servo/views/view_match.h"
 #include "view_servo/views/view_store.h"
 
 #include <geometry_msgs/PoseStamped.h>
@@ -31,21 +31,26 @@
 namespace view_servo
 {
 /** @file
- * Between the core's types and messages. All of them are values: nothing refers to its source afterwards.
+ * Between the core's types and messages. All results are copies: they do not refer to their source.
  */
 
-/** A time [s] as a stamp; what no stamp can hold becomes the nearest that one can, what is not finite 0. */
+/**
+ * A time [s] as a stamp. Times outside the range of stamps become the nearest within, and times that are not finite 0.
+ */
 ros::Time toStamp(double seconds);
 
-/** Whether K has focal lengths (REP 104 has an uncalibrated camera send it all zero) and every number of the calibration is finite. */
+/**
+ * Whether K has focal lengths (REP 104 has an uncalibrated camera send it all zero) and every number of the calibration
+ * is finite.
+ */
 bool isCalibrated(const sensor_msgs::CameraInfo& info);
 
-/** Whether two calibrations say the same, whatever their headers. */
+/** Whether two calibrations are the same; headers are not compared. */
 bool sameCalibration(const sensor_msgs::CameraInfo& a, const sensor_msgs::CameraInfo& b);
 
 /**
- * The camera of the image that comes with `info`: binning and region of interest are worked into the size, the
- * intrinsics and the projection, so that they hold for the pixels of that image.
+ * The camera of the image that comes with `info`. Size, intrinsics and projection take binning and region of interest
+ * into account, so that they hold for the pixels of that image.
  */
 Camera toCamera(const sensor_msgs::CameraInfo& info);
 sensor_msgs::CameraInfo toCameraInfo(const Camera& camera, const std_msgs::Header& header);
@@ -70,24 +75,24 @@ std::vector<PointMatch> toPointMatches(const std::vector<MatchedPoint>& matches)
 LineSegment toLineSegment(const Segment& segment);
 std::vector<LineMatch> toLineMatches(const std::vector<MatchedLine>& lines);
 
-/** Row-major. Messages hold boost::array in some ROS releases and std::array in others. */
+/** Writes a matrix row by row; arrays in messages are boost::array in some ROS releases and std::array in others. */
 template <typename Array>
 void copyRowMajor(const Eigen::Matrix3d& matrix, Array& array)
 {
   Eigen::Map<Eigen::Matrix<double, 3, 3, Eigen::RowMajor>>(array.data()) = matrix;
 }
 
-/** One after the other, 9 numbers each, row-major. */
+/** Matrices one after the other, nine numbers each, row by row. */
 std::vector<double> toRowMajor(const std::vector<Eigen::Matrix3d>& matrices);
 
 /** State TRACKING and valid when `match` found a homography, else SEARCHING; not decomposed. */
 Homography toHomography(const ViewMatch& match, const std::string& view, const std_msgs::Header& header);
 
-/** With what is known of motion and plane. @param reason why it is not tracking. */
+/** The same for a tracked plane, with what is known of motion and plane. @param reason why it is not tracked. */
 Homography toHomography(const PlaneTrack& track, const std::string& view, const std_msgs::Header& header,
                         const std::string& reason);
 
-/** A pose as tf gives it: target <- source. */
+/** A transform as tf gives it: maps points of the source frame to the target frame. */
 Eigen::Isometry3d toIsometry(const geometry_msgs::Transform& transform);
 
 Eigen::Vector3d toVector(const geometry_msgs::Vector3& vector);

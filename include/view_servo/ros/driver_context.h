@@ -22,17 +22,20 @@
 
 namespace view_servo
 {
-/** Something that has to go on coming while the robot moves. Used with the node's mutex held. */
+/** An input that has to keep coming while the robot moves, such as images. Used with the node's mutex held. */
 class DriverInput
 {
 public:
-  /** @param what comes, in words. @param topics where from. @param timeout without it, after which the robot stands [s]. */
+  /**
+   * @param what comes, in words. @param topics it comes on, for messages.
+   * @param timeout the robot stands still after so long without it [s].
+   */
   DriverInput(std::string what, std::string topics, double timeout)
     : what_(std::move(what)), topics_(std::move(topics)), watch_(timeout)
   {
   }
 
-  /** Something has come that can be used. */
+  /** To be called when something has come that can be used. */
   void accept()
   {
     watch_.feed();
@@ -44,33 +47,33 @@ public:
   {
     return came_ && !watch_.stale();
   }
-  /** Something has come that cannot. @param problem why, one line. */
+  /** To be called when something has come that cannot be used. @param problem why, in one line. */
   void reject(const std::string& problem)
   {
     problem_ = problem;
   }
   /**
-   * Judges the stamp of what has come: one that is zero, far in the future or the same as before cannot be used, and is rejected.
-   * After one that has gone back, as when a bag loops, jump() says so.
+   * Checks the stamp of what has come: when it is zero, far in the future or the same as before, calls reject() and
+   * returns false. When it has gone back, as when a bag loops, jump() says so afterwards.
    */
   bool checkStamp(const ros::Time& stamp);
-  /** By how much the stamp judged last has gone back; empty: it has not. */
+  /** Says by how much the stamp checked last has gone back; empty when it has not. */
   const std::string& jump() const
   {
     return jump_;
   }
-  /** The last one that could be used. */
+  /** The last stamp that could be used. */
   const ros::Time& lastStamp() const
   {
     return last_stamp_;
   }
-  /** A goal begins: time counts from now. */
+  /** To be called when a goal begins: the time without input counts from now. */
   void restart()
   {
     watch_.feed();
     problem_.clear();
   }
-  /** Whether goals need it; at first they do. */
+  /** Sets whether goals need this input; without a call they do. */
   void setNeeded(bool needed)
   {
     needed_ = needed;
@@ -91,7 +94,7 @@ public:
   {
     return topics_;
   }
-  /** Why what came last could not be used; empty: it could. */
+  /** Why the last input could not be used; empty when it could. */
   const std::string& problem() const
   {
     return problem_;
@@ -109,19 +112,20 @@ private:
 };
 
 /**
- * How far the stamps of odometry and images are apart, where it is so far that they cannot be used together: images may come late,
- * odometry hardly; else empty.
+ * Says how far the stamps of odometry and images are apart when this is too far to use them together; else empty. More
+ * is allowed for images that are late than for odometry that is.
  */
 std::string stampsApart(const DriverInput& odometry, const DriverInput& images);
 
 /**
- * What DriverNode offers the driver in it. One mutex guards all that either of them has. Nothing slow happens while it is held: no
- * file, no image, no wait. Whoever holds it may call actionlib, whose callbacks never take it.
+ * What DriverNode offers its driver. One mutex guards the members of both. Nothing slow happens while it is held: no
+ * file is read, no image is worked on, and nobody waits. actionlib may be called with the mutex held, because its
+ * callbacks never take it.
  */
 class DriverContext : protected NodeBase
 {
 public:
-  /** `name` as seen from other nodes. */
+  /** The name of a topic as other nodes see it. */
   std::string resolved(const std::string& name) const
   {
     return nh_.resolveName(name);
@@ -150,23 +154,25 @@ public:
     return gate_.dryRun() ? "cmd_vel_dry" : "cmd_vel";
   }
 
-  /**
-   * Subscribes. @param handler is called with a const Message::ConstPtr& and the mutex held; what it throws ends the goal with the
-   * reason.
-   */
+  /** Subscribes. @param handler is called with a const Message::ConstPtr&, by runLocked(). */
   template <typename Message, typename Handler>
   void listen(const std::string& topic, std::uint32_t queue_size, Handler handler)
   {
     const std::string what = "a message on '" + resolved(topic) + "'";
     subscribers_.push_back(subscribe<Message>(
         topic, queue_size,
-        [this, what, handler](const typename Message::ConstPtr& message) { apply(what, [&] { handler(message); }); },
+        [this, what, handler](const typename Message::ConstPtr& message) {
+          runLocked(what, [&] { handler(message); });
+        },
         ros::TransportHints().tcpNoDelay()));
   }
 
-  /** Runs `body` with the mutex held. What it throws ends the goal: the robot stops, and the reason is published. */
+  /**
+   * Runs `body` with the mutex held. If it throws, the goal ends: the robot stops, and the reason is published.
+   * @param what `body` works on, for that reason.
+   */
   template <typename Body>
-  void apply(const std::string& what, const Body& body)
+  void runLocked(const std::string& what, const Body& body)
   {
     const std::lock_guard<std::mutex> lock(mutex_);
     const std::string fault = guarded(what, body);
@@ -176,7 +182,7 @@ public:
     }
   }
 
-  /** Reads something with the mutex held. */
+  /** Returns what `body` returns, called with the mutex held. */
   template <typename Body>
   auto locked(const Body& body)
   {
@@ -184,37 +190,37 @@ public:
     return body();
   }
 
-  /** An input without which the robot does not move. Called by a driver's constructor; the node keeps it. */
+  /** Adds an input without which the robot does not move. For a driver's constructor; the node owns the input. */
   DriverInput& addInput(const std::string& what, const std::string& topics, double timeout);
 
   /**
-   * Waits until nothing that a goal needs is missing. Only for a driver's prepare(), without the mutex.
-   * @param missing see waitUntilReady(); called without the mutex.
+   * Waits for something that a goal needs before it can begin. Only for a driver's prepare(), without the mutex.
+   * @param missing says what is still missing, see waitUntilReady(); called without the mutex.
    * @throws std::runtime_error with what is missing when it does not come, or when the goal has ended meanwhile.
    */
-  void require(const std::function<std::string()>& missing);
+  void waitFor(const std::function<std::string()>& missing);
 
-  /** Publishes on `~wanted_view` which view the goal that is prepared wants. Only for prepare(), without the mutex. */
-  void wantView(const std::string& view);
+  /** Publishes on `~wanted_view` the view of the goal that is being prepared. Only for prepare(), without the mutex. */
+  void requestView(const std::string& view);
 
   /** Id of the goal; empty without one. The mutex is held. */
   virtual std::string goalId() const = 0;
-  /** Whether a goal has begun. The mutex is held. */
+  /** Whether there is a goal and it has begun. The mutex is held. */
   virtual bool goalRuns() const = 0;
   /** Stops the robot, then ends the goal, if there is one, without success. The mutex is held. */
   virtual void abort(std::string reason) = 0;
 
 protected:
-  DriverContext(const ros::NodeHandle& nh, const ros::NodeHandle& private_nh, ParameterReader& reader);
+  DriverContext(const ros::NodeHandle& nh, const ros::NodeHandle& private_nh, bool dry_run);
   ~DriverContext() = default;
 
   /** Whether the goal that is prepared is still wanted. The mutex is held. */
   virtual bool preparing() const = 0;
 
-  /** The view that is wanted while no goal says otherwise; empty: none. */
+  /** Publishes which view is wanted, and for which goal; empty: no view, no goal. */
   void publishWantedView(const std::string& view, const std::string& goal);
 
-  /** What is missing of all inputs, the first that is; empty: nothing. The mutex is held. */
+  /** What the first input with something missing says is missing; empty: nothing is. The mutex is held. */
   std::string missingInput() const;
 
   CommandGate gate_;

@@ -28,42 +28,48 @@
 namespace view_servo
 {
 /**
- * A node that drives a robot to a stored view: goals, the gate, limits, commands, status and diagnostics. What is the robot's own
- * is `Driver`. Parameters, all private:
- *  - `~dry_run`: see CommandGate; `~timeout`, `~control_rate`, `~start_patience`: see DriverParams.
+ * A node that drives a robot to a stored view. It handles goals, the gate, limits, commands, status and diagnostics;
+ * the type `Driver` adds what is particular to a kind of robot. Private parameters that all drivers have: see
+ * DriverParams.
  *
- * Publishes `~wanted_view` (view_servo/WantedView, latched), which matchers and trackers follow: nothing that moves a robot waits
- * for the answer of a service. `status` (view_servo/ServoStatus, latched); `/diagnostics`.
- * Services: `~enable` (std_srvs/SetBool). Action: Driver::ACTION.
+ * Publishes `~wanted_view` (view_servo/WantedView, latched), which matchers and trackers follow: nothing that moves a
+ * robot waits for the answer of a service. `status` (view_servo/ServoStatus, latched); `/diagnostics`. Services:
+ * `~enable` (std_srvs/SetBool). Action: Driver::ACTION.
  *
- * A goal exists from the moment it is taken. A thread of the node's own prepares it, and may wait; until it begins, and then in every
- * cycle, judge() decides whether it goes on. Whatever ends a goal, first zero is sent, then the reason is published, and zeros go on
- * for a while. One mutex guards node and driver (see DriverContext). Callbacks of actionlib only fill inboxes.
+ * A goal exists from the moment it is accepted. A thread of the node prepares it, and may wait for that. In every cycle
+ * of control, before the goal begins and after, judge() decides whether it goes on. However a goal ends, first zero is
+ * sent, then the reason is published, and more zeros follow for a while. One mutex guards node and driver (see
+ * DriverContext). Callbacks of actionlib only fill inboxes.
  *
  * `Driver` has
- *  - `Action`, `Velocity`, `Limiter` (of Velocity), `Task` (a goal that is ready to begin) and `ACTION`, the action's name;
- *  - `Params`, with `DriverParams node`, `VelocityLimits limits`, `double lost_timeout` [s], after which a goal without an input
- *    ends, and `static Params read(ParameterReader&)`;
+ *  - `Action`, `Velocity`, `Limiter` (of Velocity), `Task` (a goal that is ready to begin) and `ACTION`, the action's
+ *    name;
+ *  - `Params`, with their table parameters(Params&) and validate(), `DriverParams node`, `VelocityLimits limits`, and
+ *    `double patience() const`, the time [s] after which a goal without an input ends;
  *  - a constructor (DriverContext&, const Params&);
- *  - `std::unique_ptr<Task> prepare(const Goal&)`, without the mutex; may wait by DriverContext::require(); throws to refuse.
- *    The node itself waits for somebody who listens to the commands;
+ *  - `std::unique_ptr<Task> prepare(const Goal&)`, without the mutex; may wait by DriverContext::waitFor(); throws to
+ *    refuse. The node itself waits until somebody subscribes to the commands;
  *  and, all with the mutex held,
- *  - `void begin(std::unique_ptr<Task>)` and `void end()`, after which it knows nothing of a goal;
- *  - `Progress progress() const`, of a goal that has begun;
- *  - `Velocity wanted(double time)`, before limits; `void sent(double time, const Velocity&)`, what followers were told, and
- *    `void stands(double time, const std::string& why)`, when the robot stands because an input is missing (times of ROS [s]);
- *  - `void publish(const Velocity&)`, a command; `bool heard() const`, whether somebody listens to commands;
- *  - `std::optional<double> answered()`: age of an input [ms] that the command just sent is the first to follow;
+ *  - `void begin(std::unique_ptr<Task>)`, and `void end()`, which forgets the goal, if there is one;
+ *  - `Progress progress() const` of a goal that has begun;
+ *  - `Velocity wanted(double time)`, the velocity before limits (times are those of ROS [s]);
+ *  - `void sent(double time, const Velocity&)`, called with each command that a robot follows: not in a dry run;
+ *  - `void onMissingInput(double time, const std::string& what)`, called in each cycle in which the robot stands for
+ *    lack of it;
+ *  - `void publish(const Velocity&)`, which publishes a command, and `bool hasListener() const`, whether somebody
+ *    subscribes;
+ *  - `std::optional<double> takeLatency()`: time from an input to the command just sent [ms], once for each input:
+ *    empty when an earlier command has followed the newest input;
  *  - `void fill(ServoStatus&) const`, `void fill(Result&) const`, `void fill(Feedback&, const ServoStatus&) const`;
  *  - `void diagnose(diagnostic_updater::DiagnosticStatusWrapper&) const`;
- *  - `std::string idleView() const`: view that is wanted without a goal; empty: none.
+ *  - `std::string idleView() const`: the view that is wanted while there is no goal; empty: none.
  */
 template <typename Driver>
 class DriverNode : public DriverContext
 {
 public:
   DriverNode(const ros::NodeHandle& nh, const ros::NodeHandle& private_nh)
-    : DriverNode(nh, private_nh, ParameterReader(private_nh))
+    : DriverNode(nh, private_nh, readParams<Params>(private_nh))
   {
   }
 
@@ -82,7 +88,7 @@ public:
     }
   }
 
-  /** Sends zero, for good, and ends the goal. */
+  /** Ends the goal and sends zero; after that, nothing drives the robot any more. */
   void stop()
   {
     const std::lock_guard<std::mutex> lock(mutex_);
@@ -107,7 +113,7 @@ private:
 
   enum class Stage
   {
-    TAKEN,
+    ACCEPTED,
     PREPARING,
     RUNNING
   };
@@ -121,13 +127,13 @@ private:
     double timeout;  ///< [s]
     std::uint64_t serial;
     Clock::time_point start = Clock::now();
-    Stage stage = Stage::TAKEN;
+    Stage stage = Stage::ACCEPTED;
     bool cancelled = false;
   };
 
-  DriverNode(const ros::NodeHandle& nh, const ros::NodeHandle& private_nh, ParameterReader reader)
-    : DriverContext(nh, private_nh, reader),
-      params_(readParams(reader)),
+  DriverNode(const ros::NodeHandle& nh, const ros::NodeHandle& private_nh, const Params& params)
+    : DriverContext(nh, private_nh, params.node.dry_run),
+      params_(params),
       limiter_(params_.limits),
       status_(nh_),
       server_(nh_, Driver::ACTION, false),
@@ -143,15 +149,8 @@ private:
     server_.registerCancelCallback([this](Handle handle) { cancelled_goals_.put(handle); });
     server_.start();
     goal_thread_ = std::thread([this] { prepareGoals(); });
-    control_timer_ =
-        every(1.0 / params_.node.control_rate, "control", [this] { apply("a cycle of control", [this] { cycle(); }); });
-  }
-
-  static Params readParams(ParameterReader& reader)
-  {
-    Params params = Params::read(reader);
-    reader.finish();
-    return params;
+    control_timer_ = every(1.0 / params_.node.control_rate, "control",
+                           [this] { runLocked("a cycle of control", [this] { cycle(); }); });
   }
 
   void enable(const std_srvs::SetBool::Request& request, std_srvs::SetBool::Response& response)
@@ -183,8 +182,10 @@ private:
 
   // --------------------------------------------------------------------------------------------------------- goals
 
-  /** The newest goal that has come; empty: none. Older ones and cancelled ones end here. */
-  std::optional<Handle> newGoal()
+  /**
+   * The newest goal that has come since the last call; empty: none. Ends older ones, and marks or ends cancelled ones.
+   */
+  std::optional<Handle> takeNewGoal()
   {
     std::optional<Handle> newest;
     for (Handle& handle : new_goals_.takeAll())
@@ -206,7 +207,7 @@ private:
     return newest;
   }
 
-  /** Ends a goal that was never taken, and forgets it. */
+  /** Ends a goal that was not accepted, and resets `handle`. */
   static void refuse(std::optional<Handle>& handle, const std::string& reason)
   {
     if (handle)
@@ -218,7 +219,7 @@ private:
     }
   }
 
-  void take(Handle handle)
+  void accept(Handle handle)
   {
     handle.setAccepted();
     const Order order = *handle.getGoal();
@@ -239,7 +240,7 @@ private:
     std::unique_lock<std::mutex> lock(mutex_);
     while (true)
     {
-      wake_.wait(lock, [this] { return stopping_ || (goal_ && goal_->stage == Stage::TAKEN); });
+      wake_.wait(lock, [this] { return stopping_ || (goal_ && goal_->stage == Stage::ACCEPTED); });
       if (stopping_)
       {
         return;
@@ -253,9 +254,9 @@ private:
       try
       {
         task = driver_.prepare(order);
-        require([this] {
-          const bool heard = locked([this] { return gate_.dryRun() || driver_.heard(); });
-          return heard ? "" : "nobody listens on '" + resolved(commandTopic()) + "'";
+        waitFor([this] {
+          const bool listened = locked([this] { return gate_.dryRun() || driver_.hasListener(); });
+          return listened ? "" : "nobody listens on '" + resolved(commandTopic()) + "'";
         });
       }
       catch (const std::exception& error)
@@ -328,7 +329,7 @@ private:
     }
   }
 
-  /** Where a result has the last status, that is set. */
+  /** Sets the field `final` of results that have a status there. */
   template <typename R>
   static auto fillFinal(R& result, const ServoStatus& status, int /*preferred*/)
       -> decltype(result.final = status, void())
@@ -346,16 +347,16 @@ private:
   {
     const ros::Time now = ros::Time::now();
     const std::string jump = timeJump(last_now_, now, "the clock");
-    std::optional<Handle> next = newGoal();
+    std::optional<Handle> next = takeNewGoal();
     replaced_ = next.has_value();
     if (goal_)
     {
-      act(now.toSec(), jump);
+      control(now.toSec(), jump);
     }
     replaced_ = false;
     if (next)
     {
-      stopping_ ? refuse(next, "the node is shutting down") : take(*next);
+      stopping_ ? refuse(next, "the node is shutting down") : accept(*next);
     }
     if (!goal_)
     {
@@ -363,7 +364,8 @@ private:
     }
   }
 
-  void act(double now, const std::string& jump)
+  /** Judges the goal, and drives, stands or ends it. */
+  void control(double now, const std::string& jump)
   {
     const bool runs = goalRuns();
     Circumstances circumstances;
@@ -371,11 +373,11 @@ private:
     circumstances.replaced = replaced_;
     circumstances.enabled = gate_.open();
     circumstances.cancelled = goal_->cancelled;
-    circumstances.heard = gate_.dryRun() || driver_.heard();
+    circumstances.heard = gate_.dryRun() || driver_.hasListener();
     circumstances.elapsed = std::chrono::duration<double>(Clock::now() - goal_->start).count();
     circumstances.timeout = goal_->timeout;
     circumstances.fault = jump;
-    circumstances.patience = params_.lost_timeout;
+    circumstances.patience = params_.patience();
     circumstances.missing_input = runs ? missingInput() : "";
     if (circumstances.missing_input.empty())
     {
@@ -405,7 +407,7 @@ private:
   {
     const Velocity velocity = limiter_.next(driver_.wanted(now), 1.0 / params_.node.control_rate);
     send(velocity);
-    follow(now, velocity);
+    reportSent(now, velocity);
     publishProgress(ServoStatus::SERVOING, reason);
   }
 
@@ -420,16 +422,16 @@ private:
       sendZero();
       if (!missing.empty())
       {
-        driver_.stands(now, missing);
+        driver_.onMissingInput(now, missing);
       }
-      follow(now, Velocity::Zero());
+      reportSent(now, Velocity::Zero());
     }
     const bool lost = progress.state == Progress::LOST || !missing.empty();
     publishProgress(lost ? ServoStatus::LOST : ServoStatus::ACQUIRING, reason);
   }
 
-  /** In a dry run nobody follows what is sent. */
-  void follow(double now, const Velocity& velocity)
+  /** Tells the driver of a command, unless it is a dry run, in which no robot follows it. */
+  void reportSent(double now, const Velocity& velocity)
   {
     if (!gate_.dryRun())
     {
@@ -442,7 +444,7 @@ private:
     ServoStatus status = makeStatus(state, reason);
     driver_.fill(status);
     status_.publish(status);
-    const std::optional<double> age = driver_.answered();
+    const std::optional<double> age = driver_.takeLatency();
     if (age)
     {
       cycles_ += 1;
@@ -518,8 +520,8 @@ private:
   std::uint64_t prepared_serial_ = 0;
   bool replaced_ = false;
   bool stopping_ = false;
-  int cycles_ = 0;          // whose commands were the first to follow an input, since the last diagnosis
-  double cycle_sum_ = 0.0;  // [ms]
+  int cycles_ = 0;          // with a latency, since the last diagnosis
+  double cycle_sum_ = 0.0;  // of latencies [ms]
   double cycle_max_ = 0.0;
 
   StatusOutput status_;

@@ -11,20 +11,23 @@
 
 #include <filesystem>
 #include <string>
+#include <vector>
 
 namespace view_servo
 {
 /** Parameters that all drivers have. */
 struct DriverParams
 {
-  double timeout = 60.0;                   ///< of a goal that brings none [s], > 0
-  double control_rate = 50.0;              ///< of commands [Hz], [10, 1000]
-  double start_patience = START_PATIENCE;  ///< that a goal waits for what it needs before it begins [s], > 0
-
-  void read(ParameterReader& reader);
+  bool dry_run = false;
+  double timeout = 60.0;                   // [s]
+  double control_rate = 50.0;              // [Hz]
+  double start_patience = START_PATIENCE;  // [s]
 };
 
-/** Those of homing; the node's header says what they mean. */
+/** Names, units, ranges and meanings of these parameters, here and below. */
+std::vector<Parameter> parameters(DriverParams& params);
+
+/** Parameters of the node homing. */
 struct HomingDriverParams
 {
   DriverParams node;
@@ -35,14 +38,26 @@ struct HomingDriverParams
   double image_timeout = 0.25;
   double odometry_timeout = 0.25;
   double match_timeout = 0.25;
-  double lost_timeout = 10.0;
   HomingParams homing;
   VelocityLimits limits;
 
-  static HomingDriverParams read(ParameterReader& reader);
+  HomingDriverParams()
+  {
+    node.timeout = 120.0;
+  }
+
+  /** Time after which a goal without an input ends [s]. */
+  double patience() const
+  {
+    return homing.lost_timeout;
+  }
+  /** All faults, one a line; empty when the parameters are usable. */
+  std::vector<std::string> validate() const;
 };
 
-/** Those of servo_25d; likewise. */
+std::vector<Parameter> parameters(HomingDriverParams& params);
+
+/** Parameters of the node servo_25d. */
 struct ServoDriverParams
 {
   DriverParams node;
@@ -52,11 +67,16 @@ struct ServoDriverParams
   double max_homography_age = 0.5;
   double joint_margin = 0.02;
   double joint_timeout = 1.0;
-  double lost_timeout = 5.0;
   Servo25dParams servo;
   VelocityLimits limits = ARM_LIMITS;
 
-  static ServoDriverParams read(ParameterReader& reader);
+  double patience() const
+  {
+    return servo.lost_timeout;
+  }
+  std::vector<std::string> validate() const;
 };
+
+std::vector<Parameter> parameters(ServoDriverParams& params);
 
 }  // namespace view_servo

@@ -20,40 +20,42 @@
 
 namespace view_servo
 {
-/** An attempt to reach a view, or, without a goal, the watch for its direction. */
+/** Homing to a view: for a goal, or without one, to estimate the view's direction only. */
 struct HomingTask
 {
   std::string view;
-  sensor_msgs::CameraInfoConstPtr info;  ///< calibration that it relies on
+  sensor_msgs::CameraInfoConstPtr info;  ///< calibration that `homing` was made with
   std::unique_ptr<Homing> homing;        ///< only the worker's thread uses it
 };
 
-/** What has come of the images and matches that the worker took at once. */
+/** The result of the images and matches that the worker took together. */
 struct HomingOutcome
 {
   std::shared_ptr<HomingTask> task;
   HomingReport report;
   Course course;
-  std::optional<std::chrono::steady_clock::time_point> frame_time;  ///< when the image came; empty: there was none
-  std::string fault;                                                ///< why it could not be worked on; empty: it could
+  std::optional<std::chrono::steady_clock::time_point> frame_time;  ///< when the image came; empty: none
+  std::string fault;  ///< why the inputs could not be used; empty: they could
 };
 
 /**
- * Works on images, matches and odometry of one task at a time in a thread of its own, because an image takes longer than a cycle of
- * control. Of the images that come meanwhile it takes the newest, of matches the newest two.
+ * Works on images, matches and odometry for one task at a time, in a thread of its own because an image takes longer
+ * than a cycle of control. Of what comes while it is busy, it takes the newest image, the newest two messages of
+ * matches and all odometry.
  */
 class HomingWorker
 {
 public:
   /**
    * Both are called by the worker's thread.
-   * @param on_outcome after each time that it has worked. @param on_idle_frame with images that come while there is no task.
+   * @param on_outcome called after each piece of work. @param on_idle_frame called with images that come without a
+   * task.
    */
   HomingWorker(std::string image_topic, std::function<void(const HomingOutcome&)> on_outcome,
                std::function<void(const CameraFrame&)> on_idle_frame);
 
-  /** Works for another task from now on, and forgets what had come for the last one; null: for none. */
-  void start(const std::shared_ptr<HomingTask>& task);
+  /** Replaces the task, and forgets what has come for the old one; null: no task. */
+  void setTask(const std::shared_ptr<HomingTask>& task);
 
   void addOdometry(double stamp, const PlanarPose& base_in_odom);
   /** @param evidence in pixels of the raw images. */
@@ -63,8 +65,8 @@ public:
 private:
   struct Inbox
   {
-    std::optional<std::shared_ptr<HomingTask>> task;          ///< that all else belongs to; empty: the same as before
-    std::vector<std::pair<double, PlanarPose>> odometry;      ///< by stamp [s]
+    std::optional<std::shared_ptr<HomingTask>> task;      ///< to which the rest of the inbox belongs; empty: as before
+    std::vector<std::pair<double, PlanarPose>> odometry;  ///< by stamp [s]
     std::vector<std::pair<double, HeadingEvidence>> matches;  ///< likewise
     std::optional<CameraFrame> frame;                         ///< the newest
     std::chrono::steady_clock::time_point frame_time;

@@ -27,7 +27,7 @@ enum class SourceKind
 
 /**
  * Which field of `source` is set; CAMERA when none is.
- * @param name what an error calls the source, e.g. the field of the request that it is.
+ * @param name of the source in error texts, e.g. the request's field that holds it.
  * @throws ImageError naming the fields when several are set.
  */
 SourceKind kindOf(const ImageSource& source, const std::string& name);
@@ -35,7 +35,7 @@ SourceKind kindOf(const ImageSource& source, const std::string& name);
 /** @throws ImageError when the camera's images have another size than a stored view. */
 void requireSameSize(const std::string& view, const cv::Size& size, const sensor_msgs::Image& image);
 
-/** An image with what is known about it. */
+/** An image with what its source says about it. */
 struct SourcedImage
 {
   cv::Mat grey;
@@ -45,25 +45,34 @@ struct SourcedImage
   std::optional<ViewPose> pose;
 };
 
-/** `~views_dir` (string, default "" = $ROS_HOME/view_servo/views): where stored views are. */
-std::filesystem::path readViewsDir(ParameterReader& reader);
+/** The parameter `~views_dir`: where stored views are. */
+Parameter viewsDirParameter(std::filesystem::path& views_dir);
+
+/** The parameter `~view`, the name of a stored view. */
+Parameter viewParameter(std::string& view, std::string description);
+
+/** A fault unless `view` is empty or the name that a stored view can have. */
+std::vector<std::string> viewFaults(const std::string& view);
+
+/** The directory that an empty `~views_dir` stands for, or the one given. */
+std::filesystem::path viewsDir(const std::filesystem::path& views_dir);
 
 struct ImageSourceParams
 {
   std::filesystem::path views_dir;
   bool allow_paths = true;
-  double image_patience = 5.0;
-
-  static ImageSourceParams read(ParameterReader& reader);
+  double image_patience = 5.0;  // [s]
 };
+
+/** Names, units, ranges and meanings of these parameters. */
+std::vector<Parameter> parameters(ImageSourceParams& params);
 
 /**
  * Turns the ImageSource of a request into an image. Parameters:
- *  - `~views_dir` (string, default "" = $ROS_HOME/view_servo/views): where stored views are;
  *  - `~allow_paths` (bool, default true): whether requests may name files. They are read with the node's rights, so
  *    turn it off where requests come from strangers;
- *  - `~image_patience` (double, default 5.0 [s], >= 0): longest wait for the camera's image, when a request wants that and
- *    none has come yet.
+ *  - `~image_patience` (double, default 5.0 [s], >= 0): longest wait for an image of the camera when a request wants
+ *    one and none has come yet.
  */
 class ImageSourceReader
 {
@@ -71,8 +80,11 @@ public:
   /** `camera` must outlive the reader. */
   ImageSourceReader(const ImageSourceParams& params, const CameraInput& camera);
 
-  /** @throws ImageError or ViewStoreError, naming what is wrong in one line. @param name as in kindOf(). */
-  SourcedImage read(const ImageSource& source, const std::string& name) const;
+  /**
+   * @param kind what kindOf() returns for the source. @param name as in kindOf().
+   * @throws ImageError or ViewStoreError, naming what is wrong in one line.
+   */
+  SourcedImage read(SourceKind kind, const ImageSource& source, const std::string& name) const;
 
   const ViewStore& store() const
   {

@@ -9,8 +9,8 @@
 namespace view_servo
 {
 /**
- * Hands values from callbacks that must not wait to whoever takes them later. Nothing is called while its lock is held, so
- * that it can be used under any other one.
+ * Passes values from callbacks, which must not wait, to a thread that takes them later. Nothing is called while its
+ * lock is held, so it can be used with any other lock held.
  */
 template <typename T>
 class Inbox

@@ -10,8 +10,8 @@
 namespace view_servo
 {
 /**
- * A place for one value on its way from one thread to another; a newer one replaces it. Its lock is a leaf: nothing is called
- * while it is held.
+ * Passes values from one thread to another. It holds one value, which a newer one replaces. Nothing is called while its
+ * lock is held, so it can be used with any other lock held.
  */
 template <typename T>
 class Mailbox
@@ -26,14 +26,14 @@ public:
     changed_.notify_all();
   }
 
-  /** What is there; empty: nothing is. */
+  /** Takes the value out; empty when there is none. */
   std::optional<T> take()
   {
     const std::lock_guard<std::mutex> lock(mutex_);
     return std::exchange(value_, std::nullopt);
   }
 
-  /** Waits until something is there; empty: the box was closed. */
+  /** Waits for a value and takes it out; empty once the box is closed. */
   std::optional<T> wait()
   {
     std::unique_lock<std::mutex> lock(mutex_);
@@ -41,7 +41,7 @@ public:
     return closed_ ? std::nullopt : std::exchange(value_, std::nullopt);
   }
 
-  /** Ends all waits, for good. */
+  /** Ends all waits, now and later. */
   void close()
   {
     {

@@ -27,7 +27,7 @@ namespace view_servo
 /** An exception's text without line breaks. */
 std::string oneLine(const std::exception& error);
 
-/** A time [s] for people. */
+/** A time [s] as a text for people. */
 std::string seconds(double value);
 
 /** Time from one stamp to another [s]. Never throws, as the difference of two ros::Time does beyond 68 years. */
@@ -37,13 +37,14 @@ double secondsBetween(const ros::Time& from, const ros::Time& to);
 double ageOf(const ros::Time& stamp);
 
 /**
- * Says when stamps go back, as when a bag loops; empty: they do not. Messages may overtake each other a little.
- * @param last stamp so far, is set. @param what has the stamps.
+ * Says so when time has gone back from one stamp to the next, as when a bag loops; else empty. A small step back does
+ * not count, because messages may overtake each other.
+ * @param last stamp before, is set to `stamp`. @param what has the stamps, for the text.
  */
 std::string timeJump(ros::Time& last, const ros::Time& stamp, const std::string& what);
 
 /**
- * Runs what ROS calls, so that no message, timer or thread ends the node.
+ * Runs `body` and catches and logs what it throws, so that no message, timer or thread ends the node.
  * @param what is run, for the log.
  * @return the text of what was thrown, in one line; empty when nothing was.
  */
@@ -70,19 +71,21 @@ std::string guarded(const std::string& what, const Body& body)
 }
 
 /**
- * Lets the process keep the memory that it has freed. Images come and go with every cycle; to ask the system for them
- * each time costs a third of the time that it takes to work on them. Does nothing where the C library is not glibc.
+ * Makes the process keep memory that it frees, instead of returning it to the system. Each image is allocated anew, and
+ * asking the system for its memory costs a third of the time that the work on it takes. Does nothing unless the C
+ * library is glibc.
  */
 void keepFreedMemory();
 
 /**
- * Ends the process when it has not ended by itself a while after it was asked to: neither a long computation nor ROS, which can wait
- * for a peer that does not answer, may keep a node alive. What drives has sent its zeros by then; files are written in one step.
+ * Kills the process when it is still there a while after it was asked to end: neither a long computation nor ROS, which
+ * may wait for a peer that does not answer, can keep a node alive. By then robots have been sent zero, and no file is
+ * left half written because files are put in place in one step.
  */
 class ExitDeadline
 {
 public:
-  /** @param asked whether the process has been asked to end. */
+  /** @param asked returns whether the process has been asked to end. */
   explicit ExitDeadline(std::function<bool()> asked);
   ~ExitDeadline();
   ExitDeadline(const ExitDeadline&) = delete;
@@ -96,8 +99,8 @@ private:
 };
 
 /**
- * What all nodes share: handles, services that answer whatever happens, and `/diagnostics` once a second of wall time,
- * so that it goes on when a bag's clock does not.
+ * What all nodes share: handles, services that answer also when they fail, and `/diagnostics` once a second of wall
+ * time, which goes on while the clock of a bag stands still.
  */
 class NodeBase
 {
@@ -110,8 +113,9 @@ protected:
   ~NodeBase() = default;
 
   /**
-   * Offers a private service; what `method` throws becomes success = false and the message.
-   * @return the service's handle, to be kept.
+   * Offers a private service. When `method` throws, the response has success = false and the exception's text as
+   * message.
+   * @return the handle, which keeps the service alive.
    */
   template <typename Node, typename Request, typename Response>
   ros::ServiceServer serve(const std::string& name, void (Node::*method)(const Request&, Response&), Node* node)
@@ -177,7 +181,7 @@ int runNode(int argc, char** argv, const std::string& name)
   keepFreedMemory();
   ros::init(argc, argv, name);
   const ExitDeadline exit_deadline(&ros::isShuttingDown);
-  const ros::NodeHandle nh;  // outlives the node: without any handle, ROS ends and the last words are lost
+  const ros::NodeHandle nh;  // outlives the node: without any handle, ROS ends and the last messages are lost
   try
   {
     Node node(nh, ros::NodeHandle("~"));

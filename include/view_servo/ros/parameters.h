@@ -2,7 +2,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-#include "view_servo/views/matcher_parameters.h"
+#include "view_servo/parameters/parameter.h"
 
 #include <ros/node_handle.h>
 
@@ -15,8 +15,9 @@ namespace view_servo
  * Reads a node's private parameters and collects every fault, so that a user learns of all of them at once.
  *
  *     ParameterReader reader(private_nh);
- *     reader.read("rate", params.rate);
- *     reader.require(params.rate > 0.0, "~rate must be positive [Hz]");
+ *     reader.read(parameters(params));
+ *     reader.read(parameters(more), "group");
+ *     reader.addFaults(params.validate());
  *     reader.finish();
  */
 class ParameterReader
@@ -24,20 +25,12 @@ class ParameterReader
 public:
   explicit ParameterReader(const ros::NodeHandle& private_nh);
 
-  /** Each leaves the default where the parameter is not set. */
-  void read(const std::string& name, bool& value);
-  void read(const std::string& name, int& value);
-  void read(const std::string& name, double& value);
-  void read(const std::string& name, std::string& value);
+  /** Leaves the values of parameters that are not set as they are, which are the defaults. */
   void read(const std::vector<Parameter>& table);
-  /** Those of a sub-namespace: `~ns/name`. */
+  /** The same for parameters in a sub-namespace: `~ns/name`. */
   void read(const std::vector<Parameter>& table, const std::string& ns);
 
-  void require(bool condition, const std::string& fault);
   void addFaults(const std::vector<std::string>& faults);
-
-  /** A parameter that somebody else reads from the private namespace. */
-  void expect(const std::string& name);
 
   /**
    * Logs all values, and warns of parameters that nobody reads, naming the nearest that exists.
@@ -46,8 +39,7 @@ public:
   void finish() const;
 
 private:
-  template <typename T>
-  void readAs(const std::string& name, const std::string& type, T& value);
+  void expect(const std::string& name);
   void warnOfUnknown() const;
 
   ros::NodeHandle private_nh_;
@@ -57,12 +49,17 @@ private:
 };
 
 /**
- * Reads the options of matching by points (views/matcher_parameters.h) and validates them.
- * @param ns sub-namespace of the node that they are in; empty: none.
+ * Reads and checks all parameters of a node: those of the table `parameters(params)`, and of `params.validate()`.
+ * @throws std::invalid_argument listing all faults, one a line.
  */
-PointViewMatcherParams readMatcherParams(ParameterReader& reader, const std::string& ns = "");
-
-/** Likewise, of matching by lines. */
-LineMatcherParams readLineMatcherParams(ParameterReader& reader);
+template <typename Params>
+Params readParams(const ros::NodeHandle& private_nh, Params params = Params())
+{
+  ParameterReader reader(private_nh);
+  reader.read(parameters(params));
+  reader.addFaults(params.validate());
+  reader.finish();
+  return params;
+}
 
 }  // namespace view_servo

@@ -16,23 +16,23 @@
 namespace view_servo
 {
 /**
- * Looks for the plane of a view in a thread of its own, so that images go on meanwhile: one search at a time, none sooner than a
- * while after the one before. All methods are for one and the same thread.
+ * Searches for the plane of a view in a thread of its own, so that images are still handled meanwhile. There is one
+ * search at a time, and a least period between them. All methods are to be called by one and the same thread.
  */
 class PlaneSearcher
 {
 public:
   struct Search
   {
-    std::uint64_t era;  ///< what is asked for; answers of another era are of no use
+    std::uint64_t era;  ///< chosen by the caller, who can tell outdated answers by it
     PlaneFinder::Question question;
-    std::optional<Eigen::Isometry3d> camera_in_odom;  ///< of the image
+    std::optional<Eigen::Isometry3d> camera_in_odom;  ///< when the image was taken
     PlaneFinder::Answer answer;
   };
 
-  /** @param period from one search to the next [s]. @param finder must outlive this. */
+  /** @param period least time from the begin of one search to the next [s]. @param finder must outlive this. */
   PlaneSearcher(const PlaneFinder& finder, double period);
-  /** Waits for the match that is under way. */
+  /** Waits until the running search has ended. */
   ~PlaneSearcher();
   PlaneSearcher(const PlaneSearcher&) = delete;
   PlaneSearcher& operator=(const PlaneSearcher&) = delete;
@@ -42,7 +42,7 @@ public:
 
   void begin(Search search);
 
-  /** A search that is finished, once. */
+  /** Takes the search that has finished; empty when none has since the last call. */
   std::optional<Search> finished();
 
 private:

@@ -22,32 +22,35 @@
 namespace view_servo
 {
 /**
- * A stored view whose plane is followed through the images of one camera, with one calibration. It is found in images as they
- * come (PlaneFinder) and tracked in rectified ones (PlaneTracker). Not for several threads at once.
+ * Follows the plane of a stored view through the images of one camera, with one calibration. The view is searched for
+ * in images as they come (PlaneFinder) and tracked in rectified ones (PlaneTracker). Not for several threads at once.
  */
 class PlaneSession
 {
 public:
-  /** @throws what Rectifier and PlaneTracker throw, std::runtime_error when nothing is left of the rectified region. */
+  /** @throws what Rectifier and PlaneTracker throw, std::runtime_error when the rectified region is empty. */
   PlaneSession(std::shared_ptr<const PreparedImage> view, const sensor_msgs::CameraInfo& info,
                const PlaneTrackerParams& params);
 
-  /** Whether the camera has been calibrated as when the session began, for each image so far and this one. */
-  bool isOf(const sensor_msgs::CameraInfo& info);
+  /** To be called for each image: whether this one and all before have the calibration that the session began with. */
+  bool checkCalibration(const sensor_msgs::CameraInfo& info);
 
-  /** Before each image. @return how time has gone back, which makes it forget all that was found; empty: it has not. */
-  std::string advance(const ros::Time& stamp);
+  /**
+   * To be called before each image. When time has gone back, all that was found is forgotten.
+   * @return says by how much time has gone back; empty when it has not.
+   */
+  std::string checkTime(const ros::Time& stamp);
 
-  /** What to ask for the view's place in an image. @param raw as it came. */
+  /** The question to PlaneFinder of where the view is in an image. @param raw as it came. */
   PlaneFinder::Question question(const cv::Mat& raw) const;
 
-  /** Starts tracking where the view was found. @param camera_in_odom of that image. */
+  /** Starts tracking from where PlaneFinder found the view. @param camera_in_odom when that image was taken. */
   void start(const PlaneFinder::Answer& answer, const std::optional<Eigen::Isometry3d>& camera_in_odom);
 
-  /** The next image. @param raw as it came. @param camera_in_odom as in PlaneTracker::add(). */
+  /** Tracks the plane in the next image. @param raw as it came. @param camera_in_odom as in PlaneTracker::add(). */
   const PlaneTrack& add(const cv::Mat& raw, const std::optional<Eigen::Isometry3d>& camera_in_odom);
 
-  /** The last image with what was found in it, and a text. */
+  /** Draws what was found in the last image, with a text below. */
   cv::Mat overlay(const std::string& text) const;
 
 private:

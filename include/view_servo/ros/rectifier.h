@@ -11,8 +11,9 @@
 namespace view_servo
 {
 /**
- * Images without distortion: those of a camera that has none are left as they are, with K of its calibration; others are
- * rectified, with P's K. Binning and region of interest are worked in. Not for several threads at once.
+ * Removes the distortion of a camera's images. Images of a camera without distortion stay as they are, with the camera
+ * matrix K of its calibration; others are rectified, with the camera matrix in P. Binning and region of interest are
+ * taken into account. Not for several threads at once.
  */
 class Rectifier
 {
@@ -20,12 +21,12 @@ public:
   /** @throws std::runtime_error when the camera is not calibrated or its distortion is of an unknown model. */
   explicit Rectifier(const sensor_msgs::CameraInfo& info);
 
-  /** Whether it changes anything. */
+  /** Whether images are changed at all. */
   bool active() const
   {
     return active_;
   }
-  /** Camera matrix of the images it gives [px]. */
+  /** Camera matrix of rectified images [px]. */
   const Eigen::Matrix3d& k() const
   {
     return k_;
@@ -34,13 +35,13 @@ public:
   {
     return model_.reducedResolution();
   }
-  /** Whether another calibration says the same, whatever its header. */
-  bool isOf(const sensor_msgs::CameraInfo& info) const;
+  /** Whether a message has the calibration that this was made with; headers are not compared. */
+  bool hasCalibration(const sensor_msgs::CameraInfo& info) const;
 
-  /** Shares the data of the raw image when it changes nothing. */
+  /** The rectified image; shares the data of the raw one when not active(). */
   cv::Mat image(const cv::Mat& raw) const;
   Eigen::Vector2d point(const Eigen::Vector2d& raw) const;
-  /** The smallest rectangle around where a raw one goes, within the image; empty stays empty. */
+  /** The smallest rectangle, within the image, around a raw one after rectification; empty stays empty. */
   cv::Rect region(const cv::Rect& raw) const;
 
 private:

@@ -18,6 +18,7 @@
 #include <memory>
 #include <optional>
 #include <string>
+#include <vector>
 
 namespace view_servo
 {
@@ -25,18 +26,20 @@ struct SessionStarterParams
 {
   std::filesystem::path views_dir;
   std::string odom_frame = "base_link";
-  double tf_patience = 0.05;
+  double tf_patience = 0.05;  // [s]
   PlaneTrackerParams tracker;
-
-  static SessionStarterParams read(ParameterReader& reader);
 };
 
+/** Names, units, ranges and meanings of these parameters. */
+std::vector<Parameter> parameters(SessionStarterParams& params);
+
 /**
- * Begins to follow views as soon as all is there that it takes: the stored view, images with a calibration, and tf.
- * Safe to use from several threads. Parameters:
+ * Makes a PlaneSession for a view once everything is there that it needs: the stored view, images with a calibration,
+ * and tf. Safe to use from several threads. Parameters:
  *  - `~views_dir` (string, default "" = $ROS_HOME/view_servo/views): where stored views are;
- *  - `~odom_frame` (string, default "base_link"): frame that does not jump, which tf knows the camera's frame in; "": none;
- *  - `~tf_patience` (double, default 0.05 [s], >= 0): time that an image waits for tf;
+ *  - `~odom_frame` (string, default "base_link"): frame that does not jump, in which tf knows the camera's frame; "":
+ *    none;
+ *  - `~tf_patience` (double, default 0.05 [s], >= 0): longest wait of an image for tf;
  *  - those of tracking, see planeTrackerParameters().
  */
 class SessionStarter
@@ -45,17 +48,19 @@ public:
   struct Preparation
   {
     std::unique_ptr<PlaneSession> session;  ///< empty: not now
-    bool refused = false;                   ///< nor later, unless somebody changes something
-    std::string reason;                     ///< why not
+    bool refused = false;                   ///< it cannot be made later, either, unless somebody changes something
+    std::string reason;                     ///< why there is no session; empty when there is
   };
 
   /** @param features that views are prepared with. @param camera must outlive this. */
   SessionStarter(const SessionStarterParams& params, const FeatureParams& features, const CameraInput& camera);
 
-  /** Does not wait for what is lacking. */
+  /** A session for a view, or the reason why there is none. Does not wait for what is missing. */
   Preparation prepare(const std::string& view);
 
-  /** Where the camera was when an image was taken; empty where tf does not know. @param given_up as in waitUntilReady(). */
+  /**
+   * The camera's pose when an image was taken; empty when tf does not know it. @param given_up as in waitUntilReady().
+   */
   std::optional<Eigen::Isometry3d> cameraInOdom(const std_msgs::Header& image,
                                                 const std::function<bool()>& given_up) const;
 

@@ -11,9 +11,10 @@
 #include "view_servo/ros/parameters.h"
 #include "view_servo/ros/view_choice.h"
 #include "view_servo/views/overlay.h"
+#include "view_servo/views/point_view_matcher.h"
 #include "view_servo/views/prepared_image.h"
 #include "view_servo/views/view_cache.h"
-#include "view_servo/views/point_view_matcher.h"
+#include "view_servo/views/view_match.h"
 
 #include <diagnostic_msgs/DiagnosticStatus.h>
 #include <diagnostic_updater/DiagnosticStatusWrapper.h>
@@ -45,12 +46,16 @@ struct StreamingMatcherParams
   CameraInputParams camera;
   ImageSourceParams sources;
   std::string view;
-  double rate;
+  double rate = 5.0;  // [Hz]
 
-  static StreamingMatcherParams read(ParameterReader& reader, double default_rate);
+  /** All faults, one a line; empty when the parameters are usable. */
+  std::vector<std::string> validate() const;
 };
 
-/** What a message about a view says beside what was found. */
+/** Names, units, ranges and meanings of these parameters. */
+std::vector<Parameter> parameters(StreamingMatcherParams& params);
+
+/** What a message about a view says besides the match. */
 struct MatchLabel
 {
   std_msgs::Header header;
@@ -69,24 +74,27 @@ struct MatchLabel
  *
  * The view is chosen by `~view`, by people with `~set_view`, and by a driver with a message on `wanted_view`
  * (view_servo/WantedView); see ViewChoice. Every message says which view and which driver's goal it is about, and why
- * nothing was found. What cannot be matched at all, because there is no such view, it is damaged or has another size than the
- * camera's images, is refused by a message at once, and again at `~rate` while images come.
+ * nothing was found. What cannot be matched at all, because there is no such view, it is damaged or has another size
+ * than the camera's images, is refused by a message at once, and again at `~rate` while images come.
  *
  * Camera images are matched by a thread of the node's own, which always takes the newest: matching takes longer than
- * the time between two images, and in a subscriber's callback they would queue up and grow old. For the same reason it
- * rests while nobody listens. Its clock is steady, so that neither a paused nor a looping bag changes its pace.
+ * the time between two images, and in a subscriber's callback they would queue up and grow old. As matching is costly,
+ * nothing is matched while nobody subscribes. The pace is kept by a steady clock, so that neither a paused nor a
+ * looping bag changes it.
  *
  * `Matching` is the way of matching. It has
  *  - `Service`, whose request has reference, query and overlay, whose response success, message, elapsed_ms and
  *    overlay; `Options`, what else a request may ask for, which by default is what camera images get; `Message`, which
  *    is published on `~TOPIC`; the default `RATE` [Hz];
- *  - `static Params readParams(ParameterReader&)`, a constructor that takes those, and `FeatureParams features() const`;
+ *  - `Params`, with their table parameters(Params&) and validate(), a constructor that takes those, and
+ *    `FeatureParams features() const`;
  *  - `static void clear(Service::Response&)`, which sets what a refused request leaves unknown;
  *  - `static Options options(const Service::Request&)`, which throws when the request makes no sense;
- *  - `ViewMatch match(const PreparedImage& reference, const PreparedImage& current, const Options&, given_up) const`, which ends
- *    early, if it can, once `given_up()` holds;
+ *  - `ViewMatch match(const PreparedImage& reference, const PreparedImage& current, const Options&, given_up) const`,
+ *    which ends early, if it can, once `given_up()` holds;
  *  - `static void fill(const ViewMatch&, Service::Response&)`, for the fields that are the service's own;
- *  - `static Message toMessage(const ViewMatch&, const MatchLabel&)`, whose reason is the match's message when nothing was found.
+ *  - `static Message toMessage(const ViewMatch&, const MatchLabel&)`, whose reason is the match's message when nothing
+ *    was found.
  */
 template <typename Matching>
 class StreamingMatcher : private NodeBase
@@ -94,7 +102,7 @@ class StreamingMatcher : private NodeBase
 public:
   /** @throws std::invalid_argument listing all faults of the parameters. */
   StreamingMatcher(const ros::NodeHandle& nh, const ros::NodeHandle& private_nh)
-    : StreamingMatcher(nh, private_nh, Params::read(private_nh))
+    : StreamingMatcher(nh, private_nh, readParams(private_nh, defaults()))
   {
   }
 
@@ -116,16 +124,35 @@ private:
     StreamingMatcherParams node;
     typename Matching::Params matching;
 
-    static Params read(const ros::NodeHandle& private_nh)
+    std::vector<std::string> validate() const
     {
-      ParameterReader reader(private_nh);
-      Params params{ StreamingMatcherParams::read(reader, Matching::RATE), Matching::readParams(reader) };
-      reader.finish();
-      return params;
+      std::vector<std::string> faults = node.validate();
+      const std::vector<std::string> more = matching.validate();
+      faults.insert(faults.end(), more.begin(), more.end());
+      return faults;
+    }
+
+    friend std::vector<Parameter> parameters(Params& params)
+    {
+      return joined({ parameters(params.node), parameters(params.matching) });
     }
   };
 
-  /** What came of an image, for diagnostics. */
+  static Params defaults()
+  {
+    Params params;
+    params.node.rate = Matching::RATE;
+    return params;
+  }
+
+  /** An image of a request; the header is empty for a stored view. */
+  struct RequestedImage
+  {
+    std::shared_ptr<const PreparedImage> image;
+    std_msgs::Header header;
+  };
+
+  /** What diagnostics report of the last image. */
   struct Result
   {
     bool failed = false;
@@ -147,7 +174,7 @@ private:
     if (!params.node.view.empty())
     {
       choice_.choose(params.node.view);
-      begin();
+      onChoice();
     }
     wanted_subscriber_ = subscribe<WantedView>("wanted_view", 5,
                                                [this](const WantedView::ConstPtr& message) { onWantedView(*message); });
@@ -163,14 +190,13 @@ private:
   {
     Matching::clear(response);
     const typename Matching::Options options = Matching::options(request);
-    std_msgs::Header header;
-    const std::shared_ptr<const PreparedImage> reference = prepare(request.reference, "reference", header);
-    const std::shared_ptr<const PreparedImage> query = prepare(request.query, "query", header);
-    const ViewMatch result = matching_.match(*reference, *query, options, given_up_);
+    const RequestedImage reference = prepare(request.reference, "reference");
+    const RequestedImage query = prepare(request.query, "query");
+    const ViewMatch result = matching_.match(*reference.image, *query.image, options, given_up_);
 
     if (request.overlay)
     {
-      response.overlay = overlay(*reference, *query, result, header);
+      response.overlay = overlay(*reference.image, *query.image, result, query.header);
     }
     response.success = result.outcome == MatchOutcome::MATCHED;
     response.message = result.message;
@@ -179,17 +205,15 @@ private:
   }
 
   /** The image of a request; a stored view comes from the cache, with what was computed for it before. */
-  std::shared_ptr<const PreparedImage> prepare(const ImageSource& source, const std::string& name,
-                                               std_msgs::Header& header)
+  RequestedImage prepare(const ImageSource& source, const std::string& name)
   {
-    if (kindOf(source, name) == SourceKind::VIEW)
+    const SourceKind kind = kindOf(source, name);
+    if (kind == SourceKind::VIEW)
     {
-      header = std_msgs::Header();
-      return views_.get(source.view);
+      return { views_.get(source.view), std_msgs::Header() };
     }
-    const SourcedImage image = sources_.read(source, name);
-    header = image.header;
-    return std::make_shared<const PreparedImage>(image.grey, image.region, features_);
+    const SourcedImage image = sources_.read(kind, source, name);
+    return { std::make_shared<const PreparedImage>(image.grey, image.region, features_), image.header };
   }
 
   static sensor_msgs::Image overlay(const PreparedImage& reference, const PreparedImage& current,
@@ -207,7 +231,7 @@ private:
     {
       const std::lock_guard<std::mutex> lock(mutex_);
       choice_.choose(request.view);
-      begin();
+      onChoice();
     }
     response.success = true;
     response.message = request.view.empty() ? "camera images are not matched"
@@ -220,13 +244,13 @@ private:
     const std::lock_guard<std::mutex> lock(mutex_);
     if (choice_.want(message))
     {
-      begin();
+      onChoice();
       ROS_INFO_STREAM("wanted: view '" << message.view << "', goal '" << message.goal << "'");
     }
   }
 
-  /** Another choice is made. The mutex is held. */
-  void begin()
+  /** Has the worker turn to the choice that was just made. The mutex is held. */
+  void onChoice()
   {
     newest_.reset();  // it may be old
     last_result_ = Result();

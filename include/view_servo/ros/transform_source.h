@@ -13,8 +13,8 @@
 namespace view_servo
 {
 /**
- * What tf knows. Waits are by a steady clock: tf2's own timeouts are on ROS' clock, and do not end while that stands still.
- * Safe to use from several threads.
+ * Looks transforms up in tf. Waits are by a steady clock; tf2's own timeouts are on the clock of ROS, and do not end
+ * while that stands still. Safe to use from several threads.
  */
 class TransformSource
 {
@@ -22,14 +22,14 @@ public:
   TransformSource();
 
   /**
-   * What tf lacks to know `source` in `target` at a time, in one line; empty: nothing.
-   * @param stamp ros::Time(0): the latest time at which it is known.
+   * Why tf cannot give the transform from `source` to `target` at a time, in one line; empty when it can.
+   * @param stamp the time; ros::Time(0): the latest time at which the transform is known.
    */
   std::string missing(const std::string& target, const std::string& source, const ros::Time& stamp) const;
 
   /**
-   * The transform that takes points of `source` to `target`, as soon as tf knows it.
-   * @param patience longest wait for it [s]. @param given_up as in waitUntilReady(). @param stamp as above.
+   * Waits until tf knows the transform that maps points of `source` to `target`, and returns it.
+   * @param patience longest wait [s]. @param given_up as in waitUntilReady(). @param stamp as above.
    * @throws std::runtime_error with what is missing.
    */
   geometry_msgs::TransformStamped lookUp(const std::string& target, const std::string& source, const ros::Time& stamp,

@@ -9,13 +9,14 @@
 namespace view_servo
 {
 /**
- * What a matcher or a tracker has answered, in its messages, to the view that a driver wants (WantedView). Messages without a
- * goal's id count, too: somebody else has chosen the same view.
+ * Follows the messages of a matcher or tracker, as its answer to the view that a driver wants (WantedView): whether
+ * they are about that view, or refuse it. Messages without a goal's id count as well, as somebody else may have chosen
+ * the same view.
  */
 class ViewAnswer
 {
 public:
-  /** @param what the messages are, in the plural. @param topic that they come on, for people. */
+  /** @param what the messages are, in the plural. @param topic that they come on. Both are for texts. */
   ViewAnswer(std::string what, std::string topic) : what_(std::move(what)), topic_(std::move(topic))
   {
   }
@@ -23,7 +24,7 @@ public:
   /** Another view is wanted from now on; empty: none. */
   void want(const std::string& view, const std::string& goal);
 
-  /** A message has come. @return whether it is about the view that is wanted, and can be used. */
+  /** To be called with each message. @return whether it is about the wanted view and does not refuse it. */
   template <typename Message>
   bool add(const Message& message)
   {
@@ -39,17 +40,17 @@ public:
   {
     return came_;
   }
-  /** Why the view cannot be matched or followed at all; empty: it can, or nothing was said. */
+  /** Why the sender refuses the wanted view; empty when it does not. */
   const std::string& refusal() const
   {
     return refusal_;
   }
-  /** Says that messages are about another view, when the last one was; empty: it was not. */
+  /** Says so when the last message was about another view; else empty. */
   const std::string& otherView() const
   {
     return other_view_;
   }
-  /** What has not come, and what came instead, in one line; empty: it has come. */
+  /** What has not come, and what came instead, in one line; empty once a message about the wanted view has come. */
   std::string missing() const;
 
 private:
@@ -65,8 +66,8 @@ private:
 };
 
 /**
- * What has not come of several, one of which has to answer; empty: one has.
- * @throws std::runtime_error with the reason when all refuse the view.
+ * The same for several senders, one of which has to answer: what has not come; empty once one has answered.
+ * @throws std::runtime_error with the reason when all of them refuse the view.
  */
 std::string missingAnswer(std::initializer_list<const ViewAnswer*> answers);
 

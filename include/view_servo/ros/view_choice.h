@@ -13,10 +13,13 @@ namespace view_servo
 struct ChosenView
 {
   std::string view;  ///< empty: none
-  std::string goal;  ///< of the driver that wants the view; empty: of nobody
+  std::string goal;  ///< id of the goal for which a driver wants the view; empty: no driver does
 };
 
-/** The view that a node works on: people choose it by a service or parameter, drivers by a WantedView. The newest choice counts. */
+/**
+ * The view that a node works on. People choose it by a service or parameter, drivers by WantedView; the newest choice
+ * counts.
+ */
 class ViewChoice
 {
 public:
@@ -24,8 +27,8 @@ public:
   void choose(const std::string& view);
 
   /**
-   * A driver's choice. A message without a view ends what a driver has chosen, but not what a person has: it may be a latched
-   * one from before. A latched message that comes once more says nothing new.
+   * A driver's choice. A message without a view ends the choice of a driver, but not that of a person, because it may
+   * be an old latched one. The same latched message once more changes nothing.
    * @return whether the choice changes.
    */
   bool want(const WantedView& message);

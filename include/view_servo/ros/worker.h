@@ -14,14 +14,18 @@
 namespace view_servo
 {
 /**
- * A thread that works on what others put into its inbox, so that they need not wait. It takes all that has gathered at once;
- * `Inbox`, which can be made empty, says how things gather. Nothing is called while its lock is held but the edits of put().
+ * A thread that works on what others put into its inbox, so that they need not wait. It takes the whole inbox at once.
+ * The type `Inbox`, default-constructed empty, defines how inputs gather there. While the lock is held, only the edits
+ * of put() are called.
  */
 template <typename Inbox>
 class Worker
 {
 public:
-  /** @param what it does, for the log. @param work called by the thread with each inbox; what it throws is logged. */
+  /**
+   * @param what the thread does, for the log. @param work called by the thread with each inbox; what it throws is
+   * logged.
+   */
   Worker(std::string what, std::function<void(Inbox&&)> work) : what_(std::move(what)), work_(std::move(work))
   {
     thread_ = std::thread([this] { run(); });
@@ -38,7 +42,7 @@ public:
   Worker(const Worker&) = delete;
   Worker& operator=(const Worker&) = delete;
 
-  /** Edits the inbox and wakes the thread. @param edit quick, must not put anything itself. */
+  /** Edits the inbox and wakes the thread. @param edit has to be quick, and must not call put(). */
   template <typename Edit>
   void put(const Edit& edit)
   {

@@ -3,6 +3,7 @@
 #pragma once
 
 #include "view_servo/geometry/correspondence.h"
+#include "view_servo/parameters/parameter.h"
 
 #include <Eigen/Core>
 #include <opencv2/core/mat.hpp>
@@ -30,6 +31,9 @@ struct HomographyAlignerParams
   /** All faults, one a line; empty when the parameters are usable. */
   std::vector<std::string> validate() const;
 };
+
+/** Names, units and ranges of these parameters, by which validate() checks them. */
+std::vector<Parameter> parameters(HomographyAlignerParams& params);
 
 /** What the tracker says of an image. */
 struct TrackedHomography

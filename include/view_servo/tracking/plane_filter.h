@@ -3,6 +3,7 @@
 #pragma once
 
 #include "view_servo/geometry/euclidean_homography.h"
+#include "view_servo/parameters/parameter.h"
 
 #include <Eigen/Core>
 #include <Eigen/Geometry>
@@ -25,6 +26,9 @@ struct PlaneFilterParams
   /** All faults, one a line; empty when the parameters are usable. */
   std::vector<std::string> validate() const;
 };
+
+/** Names, units and ranges of these parameters, by which validate() checks them. */
+std::vector<Parameter> parameters(PlaneFilterParams& params);
 
 /** What the filter knows after a measurement. */
 struct PlaneEstimate

@@ -2,6 +2,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include "view_servo/parameters/parameter.h"
 #include "view_servo/tracking/homography_aligner.h"
 #include "view_servo/tracking/plane_filter.h"
 
@@ -26,6 +27,9 @@ struct PlaneTrackerParams
   /** All faults, one a line; empty when the parameters are usable. */
   std::vector<std::string> validate() const;
 };
+
+/** Names, units and ranges of these parameters, by which validate() checks them. */
+std::vector<Parameter> parameters(PlaneTrackerParams& params);
 
 enum class TrackingState
 {

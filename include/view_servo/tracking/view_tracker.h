@@ -5,6 +5,7 @@
 #include "view_servo/geometry/camera.h"
 #include "view_servo/geometry/correspondence.h"
 #include "view_servo/geometry/planar_motion.h"
+#include "view_servo/parameters/parameter.h"
 
 #include <Eigen/Core>
 #include <opencv2/core/mat.hpp>
@@ -31,6 +32,9 @@ struct ViewTrackerParams
   /** All faults, one a line; empty when the parameters are usable. */
   std::vector<std::string> validate() const;
 };
+
+/** Names, units and ranges of these parameters, by which validate() checks them. */
+std::vector<Parameter> parameters(ViewTrackerParams& params);
 
 /**
  * Follows the stored view from a camera that moves on the floor, in image space: points of the stored view, whose depth

@@ -5,8 +5,11 @@
 #include "view_servo/features/line_segments.h"
 #include "view_servo/matching/line_features.h"
 #include "view_servo/matching/line_regions.h"
+#include "view_servo/parameters/parameter.h"
+#include "view_servo/robust/line_planes.h"
 #include "view_servo/robust/ransac.h"
-#include "view_servo/views/point_view_matcher.h"
+#include "view_servo/views/prepared_image.h"
+#include "view_servo/views/view_match.h"
 
 #include <cstdint>
 #include <string>
@@ -14,17 +17,15 @@
 
 namespace view_servo
 {
-/** Options of the whole way from two images' segments to their geometry. */
+/** Options of everything between the line segments of two images and their geometry. */
 struct LineMatcherParams
 {
   LineSegmentParams segments;
   LineFeatureParams features;
   LineRegionParams regions;
-  RansacParams ransac;           ///< of points and of lines; the inlier threshold is that of points [px]
-  double plane_threshold = 2.0;  ///< of the lines of a plane, across, in either image [px], > 0
-  int min_plane_lines = 8;       ///< lines that make a plane, >= 5
-  int max_planes = 4;            ///< planes looked for, >= 1
-  double min_quality = 0.5;      ///< mean of share and correlation of a match, [0, 1)
+  RansacParams ransac;  ///< for points and lines; the inlier threshold is that of points [px]
+  LinePlaneParams planes;
+  double min_quality = 0.5;  ///< least MatchedLine::score of a match, [0, 1)
   std::uint64_t seed = 1;
 
   LineMatcherParams();
@@ -33,9 +34,12 @@ struct LineMatcherParams
   std::vector<std::string> validate() const;
 };
 
+/** Names, units and ranges of these parameters, by which validate() checks them. */
+std::vector<Parameter> parameters(LineMatcherParams& params);
+
 /**
- * Matches the line segments of two views by the structure of their groups (thesis ch. 4), and what the image shows
- * beside them. Stateless between calls: the same input gives the same result.
+ * Matches the line segments of two views by the structure of groups of neighbouring segments (thesis ch. 4) and by what
+ * the images show beside the segments. Stateless between calls: the same input gives the same result.
  */
 class LineViewMatcher
 {
@@ -49,14 +53,25 @@ public:
   }
 
   /**
-   * Votes of groups, regions of segments that agree with a local homography, the regions that agree with one epipolar
-   * geometry, planes, and what the planes predict. In the result, `lines` are the matched segments, with their indices
-   * among those given to LineFeatures; `matches` the intersections of neighbouring ones; `planes` the homographies of
-   * planes; `fundamental` that of the points or, where they do not determine it, of two planes. `matrix` is the first
-   * plane's or the fundamental one. Both must have been prepared with params().features.
+   * In the result, `lines` are the matched segments, with their indices among those given to LineFeatures; `matches`
+   * are the intersections of matched neighbours; `planes` the homographies of planes; `fundamental` comes from the
+   * intersections or, where these do not determine it, from two planes. `matrix` is the homography of the first plane
+   * or the fundamental matrix, as `model` says.
+   *
+   * Steps: groups vote for pairs of segments; from these grow regions of segments that agree with a local homography;
+   * regions that contradict the epipolar geometry of all are dropped; planes are fitted to what remains.
+   *
+   * Both LineFeatures must have been made with params().features.
    */
   ViewMatch match(const LineFeatures& reference, const LineFeatures& current, GeometryModel model,
                   LineGrouping groups) const;
+
+  /**
+   * The same of images, which must have been prepared with params().segments and params().features. The times in the
+   * result include the detection of segments, where an image did not have them yet.
+   */
+  ViewMatch match(const PreparedImage& reference, const PreparedImage& current,
+                  GeometryModel model = GeometryModel::HOMOGRAPHY, LineGrouping groups = LineGrouping::TRIPLETS) const;
 
 private:
   LineMatcherParams params_;

@@ -3,7 +3,8 @@
 #pragma once
 
 #include "view_servo/geometry/correspondence.h"
-#include "view_servo/views/point_view_matcher.h"
+#include "view_servo/views/prepared_image.h"
+#include "view_servo/views/view_match.h"
 
 #include <Eigen/Core>
 #include <opencv2/core/mat.hpp>
@@ -14,15 +15,17 @@
 namespace view_servo
 {
 /**
- * A picture of a match, BGR: reference left, current right, inliers joined by lines coloured by their place in the
- * reference, other candidates as small dots. A match of line segments shows them instead, a pair in one colour, up to
- * sixty with their rank, and their intersections as small dots: those of the first plane are plain, those of the second
- * carry a bead, of the third two, and those of no plane are thin. For the homography of one plane the outline of the
- * reference's region is drawn in both images. A line of text below says what was found (or why nothing was).
+ * Draws a match, BGR: the reference on the left, the current image on the right, and below a line of text that says
+ * what was found, or why nothing was.
+ *  - Points: inliers are joined by lines, coloured by their position in the reference; other candidates are small dots.
+ *  - Line segments: the two of a pair have one colour, and the best sixty show their rank. Segments on the first plane
+ *    are plain, those on the second carry a bead, on the third two; those on no plane are thin. Intersections are small
+ *    dots.
+ *  - For the homography of a plane, the outline of the reference's region is drawn in both images.
  */
 cv::Mat drawOverlay(const PreparedImage& reference, const PreparedImage& current, const ViewMatch& match);
 
-/** A stored view that is followed through images. */
+/** A stored view that is tracked, for drawFollowedView(). */
 struct FollowedView
 {
   cv::Rect region;    ///< of the stored view [px]
@@ -33,7 +36,9 @@ struct FollowedView
   std::string text;   ///< one line
 };
 
-/** A picture of it, BGR: the outline of the region, found points green, missing ones red, the path, the text below. */
+/**
+ * Draws a tracked view, BGR: the outline of its region, points found in green, missing ones in red, the path, the text.
+ */
 cv::Mat drawFollowedView(const cv::Mat& current, const FollowedView& view);
 
 }  // namespace view_servo

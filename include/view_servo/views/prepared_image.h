@@ -16,7 +16,10 @@
 
 namespace view_servo
 {
-/** Options of all that may be asked of an image. Who matches by points only, or by lines only, gives only those. */
+/**
+ * Options of the features of an image. For matching by points only, or by lines only, the others can keep their
+ * defaults.
+ */
 struct FeatureParams
 {
   FeatureParams() = default;
@@ -34,8 +37,8 @@ struct FeatureParams
 };
 
 /**
- * An image with the features that matching asks for, each computed once, when it is first needed: a stored view that
- * is kept costs nothing for the next live image. Safe to use from several threads.
+ * An image with the features for matching, each computed once, when it is first asked for: a stored view that is kept
+ * need not be analysed again for the next live image. Safe to use from several threads.
  *
  * Level l is the image reduced by 2^(l/2) on each side. Its features are in its own pixels; toFull() maps them.
  * Asking for a level outside [0, LEVELS) throws std::out_of_range.
@@ -46,7 +49,7 @@ public:
   static constexpr int LEVELS = 5;
 
   /**
-   * @param grey 8-bit, one channel; shared, not to be written to afterwards.
+   * @param grey 8-bit, one channel; the data is shared and must not be changed afterwards.
    * @param region where features are looked for [px]; empty = everywhere.
    * @throws std::invalid_argument when the image has the wrong type or the region leaves it.
    */

@@ -14,8 +14,8 @@
 namespace view_servo
 {
 /**
- * Stored views that keep their features, so that a reference is read and indexed once however many images are matched
- * with it. Holds the views used last; one that was saved anew is read again. Safe to use from several threads.
+ * Keeps the stored views used last, with their features, so that a view is read and indexed once however many images
+ * are matched with it. A view that was saved anew is read again. Safe to use from several threads.
  */
 class ViewCache
 {
@@ -23,7 +23,7 @@ public:
   /** @param capacity views kept, >= 1. */
   ViewCache(ViewStore store, const FeatureParams& params, std::size_t capacity = 4);
 
-  /** @throws ViewStoreError as ViewStore::load(). */
+  /** The stored view with its features. @throws ViewStoreError as ViewStore::load(). */
   std::shared_ptr<const PreparedImage> get(const std::string& name);
 
 private:

@@ -43,7 +43,7 @@ public:
   using std::runtime_error::runtime_error;
 };
 
-/** Whether a name matches [A-Za-z0-9][A-Za-z0-9_-]{0,63}: it is also a file's name, so nothing else is let through. */
+/** Whether a name matches [A-Za-z0-9][A-Za-z0-9_-]{0,63}: it becomes part of a file's name. */
 bool isValidViewName(const std::string& name);
 
 /** @throws std::runtime_error when the view's image has another size than the camera's. */
@@ -52,10 +52,11 @@ void requireSize(const StoredView& view, const cv::Size& camera);
 /**
  * Stored views in a directory, one `NAME.yaml` each beside its image `NAME.HASH.png`.
  *
- * The yaml file is what makes a view exist: it names the image, its size and checksum, and is put in place by rename(2)
- * after image and yaml were written and synced, so a crash leaves either the old view or the new one, and at most
- * an unreferenced file, which the next save or removal of that name deletes. Views are independent files: a damaged
- * one is reported by name and takes no other with it. Safe for several processes as long as one at a time writes a name.
+ * A view exists when its yaml file does: it names the image, its size and checksum, and is put in place by rename(2)
+ * after image and yaml were written and synced. So a crash leaves either the old view or the new one, and at most an
+ * unreferenced file, which the next save or removal of that name deletes. Views do not share files: a damaged one is
+ * reported by name and the others stay usable. Several processes may use a directory as long as only one at a time
+ * writes a name.
  */
 class ViewStore
 {
@@ -68,13 +69,15 @@ public:
     return directory_;
   }
 
-  /** @throws ViewStoreError for a bad name, image or region, for a name in use unless `overwrite`, on a full disk. */
+  /**
+   * @throws ViewStoreError for a bad name, image or region, for a name in use unless `overwrite`, and on a full disk.
+   */
   void save(const StoredView& view, bool overwrite) const;
 
   /** @throws ViewStoreError when there is no such view or it is damaged. */
   StoredView load(const std::string& name) const;
 
-  /** Changes whenever the view is saved anew; cheap. @throws ViewStoreError as load(), without reading the image. */
+  /** A text that changes whenever the view is saved anew. Does not read the image. @throws ViewStoreError as load(). */
   std::string revision(const std::string& name) const;
 
   struct Damaged

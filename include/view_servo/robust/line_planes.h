@@ -1,0 +1,69 @@
+// Copyright (c) 2026, the view_servo authors
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include "view_servo/geometry/correspondence.h"
+#include "view_servo/geometry/line_homography.h"
+#include "view_servo/parameters/parameter.h"
+#include "view_servo/robust/ransac.h"
+
+#include <Eigen/Core>
+
+#include <optional>
+#include <string>
+#include <vector>
+
+namespace view_servo
+{
+/** @file
+ * Planes on which matched line segments lie, and the fundamental matrix of such a scene (thesis 4.7).
+ */
+
+struct LinePlaneParams
+{
+  double threshold = 2.0;  ///< largest distance of a plane's lines, across, in either image [px], > 0
+  int min_lines = 8;       ///< lines that make a plane, >= 5
+  int max_planes = 4;      ///< planes looked for, >= 1
+
+  /** All faults, one a line; empty when the parameters are usable. */
+  std::vector<std::string> validate() const;
+};
+
+/** Names, units and ranges of these parameters, by which validate() checks them. */
+std::vector<Parameter> parameters(LinePlaneParams& params);
+
+/** The planes found, as homographies x_cur ~ H x_ref [px], and which of them each line is on. */
+struct LinePlanes
+{
+  std::vector<Eigen::Matrix3d> homographies;  ///< in the order in which they were found: the largest first, as a rule
+  std::vector<int> of_line;                   ///< index into `homographies` for each line; -1: on no plane
+};
+
+/**
+ * One plane after the other, each by RANSAC among the lines that lie on none of those before (thesis 4.7.1).
+ * @param ransac_params of each plane; threshold and sampling are set here, and at most 500 iterations are made.
+ */
+LinePlanes findPlanes(const SegmentPairs& lines, const LinePlaneParams& params, const RansacParams& ransac_params,
+                      Rng& rng);
+
+/**
+ * Whether the transfer error of a pair of points, RMS of the two images, is at most `threshold` [px] for some plane.
+ */
+bool liesOnPlane(const LinePlanes& planes, const Correspondence& point, double threshold);
+
+/**
+ * Fundamental matrix (x_curᵀ F x_ref = 0, pixels) by RANSAC from points, such as intersections of matched lines. Empty
+ * when there are fewer than twelve, when no matrix agrees with twelve, and when nearly all lie on one of the planes,
+ * which leaves F undetermined.
+ */
+std::optional<Eigen::Matrix3d> fundamentalOfPoints(const Correspondences& points, const LinePlanes& planes,
+                                                   const RansacParams& params, Rng& rng);
+
+/**
+ * Fundamental matrix from the first two planes (thesis 4.7): the fit to the end points of their lines, each paired with
+ * the point to which its plane's homography maps it. Empty when there are fewer than two planes, or they leave F
+ * undetermined.
+ */
+std::optional<Eigen::Matrix3d> fundamentalOfPlanes(const SegmentPairs& lines, const LinePlanes& planes);
+
+}  // namespace view_servo

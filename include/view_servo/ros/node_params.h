@@ -1,0 +1,45 @@
+// Copyright (c) 2026, the view_servo authors
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include "view_servo/parameters/parameter.h"
+#include "view_servo/ros/camera_input.h"
+#include "view_servo/ros/image_source.h"
+#include "view_servo/ros/session_starter.h"
+#include "view_servo/views/point_view_matcher.h"
+
+#include <string>
+#include <vector>
+
+namespace view_servo
+{
+/** Parameters of the node view_store. */
+struct ViewStoreNodeParams
+{
+  CameraInputParams camera;
+  ImageSourceParams sources;
+  std::string fixed_frame = "odom";
+
+  /** All faults, one a line; empty when the parameters are usable. */
+  std::vector<std::string> validate() const;
+};
+
+/** Names, units, ranges and meanings of these parameters, here and below. */
+std::vector<Parameter> parameters(ViewStoreNodeParams& params);
+
+/** Parameters of the node homography_tracker, but for those in its sub-namespace. */
+struct HomographyTrackerNodeParams
+{
+  CameraInputParams camera;
+  SessionStarterParams sessions;
+  std::string view;
+  double match_period = 0.3;        // [s]
+  PointViewMatcherParams matching;  // in the sub-namespace `matching`
+
+  /** All faults, one a line; empty when the parameters are usable. */
+  std::vector<std::string> validate() const;
+};
+
+std::vector<Parameter> parameters(HomographyTrackerNodeParams& params);
+
+}  // namespace view_servo

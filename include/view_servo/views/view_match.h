@@ -1,0 +1,86 @@
+// Copyright (c) 2026, the view_servo authors
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include "view_servo/geometry/correspondence.h"
+#include "view_servo/geometry/line_segment.h"
+#include "view_servo/robust/ransac.h"
+
+#include <Eigen/Core>
+
+#include <limits>
+#include <string>
+#include <vector>
+
+namespace view_servo
+{
+/** Which geometry relates two images; PointViewMatcher and LineViewMatcher estimate either. */
+enum class GeometryModel
+{
+  HOMOGRAPHY,  ///< x_cur ~ H x_ref, for planes
+  FUNDAMENTAL  ///< x_curᵀ F x_ref = 0, for scenes with depth
+};
+
+enum class MatchOutcome
+{
+  MATCHED,
+  TOO_FEW_FEATURES,
+  NO_GEOMETRY
+};
+
+/** A candidate match of two points: corners (PointViewMatcher) or intersections of lines (LineViewMatcher). */
+struct MatchedPoint
+{
+  Correspondence position;  ///< pixels of the full images
+  double score;  ///< larger is better: association weight of corners, lower quality of the two lines that intersect
+  bool inlier;   ///< agrees with the geometry that was found
+};
+
+/** A line segment matched by LineViewMatcher. */
+struct MatchedLine
+{
+  Segment reference;  ///< pixels of the full images
+  Segment current;
+  int reference_index;  ///< among the segments given to the image's LineFeatures
+  int current_index;
+  double score;    ///< quality: mean of common share and correlation, in [0, 1]
+  int plane = -1;  ///< index into ViewMatch::planes; -1 = none
+};
+
+struct StageTime
+{
+  std::string name;
+  double ms;
+};
+
+/** The result of matching a stored view (`reference`) with a live image (`current`), by points or by lines. */
+struct ViewMatch
+{
+  MatchOutcome outcome = MatchOutcome::NO_GEOMETRY;
+  std::string message;  ///< one line, for people
+  GeometryModel model = GeometryModel::HOMOGRAPHY;
+  Eigen::Matrix3d matrix;             ///< NaN unless MATCHED; H with H(2,2) = 1 where possible, F with norm 1
+  std::vector<MatchedPoint> matches;  ///< all candidates, best first
+  int inliers = 0;                    ///< data that agree with `matrix`: points; for LineViewMatcher's H, lines
+  double rms_error = 0.0;   ///< of the inliers: transfer error in one image (H) or Sampson distance (F) [px]; NaN: none
+  RansacStatistics ransac;  ///< of the attempt that succeeded, else of the last
+  std::vector<StageTime> stages;
+  double elapsed_ms = 0.0;
+
+  /** @name Set by PointViewMatcher only; zero otherwise.
+   * @{ */
+  double log_significance = 0.0;  ///< -log10 of the expected number of geometries this good among chance matches
+  int reference_level = 0;        ///< of PreparedImage, where the geometry was found
+  int current_level = 0;
+  /** @} */
+
+  /** @name Set by LineViewMatcher only; empty and NaN otherwise.
+   * @{ */
+  std::vector<MatchedLine> lines;       ///< best first
+  std::vector<Eigen::Matrix3d> planes;  ///< homographies x_cur ~ H x_ref of planes, most lines first
+  /** x_curᵀ F x_ref = 0, whatever the model asked for; NaN when it cannot be estimated. */
+  Eigen::Matrix3d fundamental = Eigen::Matrix3d::Constant(std::numeric_limits<double>::quiet_NaN());
+  /** @} */
+};
+
+}  // namespace view_servo

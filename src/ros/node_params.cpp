@@ -1,0 +1,51 @@
+// Copyright (c) 2026, the view_servo authors
+// SPDX-License-Identifier: BSD-3-Clause
+#include "view_servo/ros/node_params.h"
+
+#include "view_servo/parameters/faults.h"
+
+namespace view_servo
+{
+std::vector<Parameter> parameters(ViewStoreNodeParams& params)
+{
+  return joined({
+      {
+          text("fixed_frame", params.fixed_frame,
+               "frame in which the camera's pose is stored with a view, where tf knows it; empty: never"),
+      },
+      parameters(params.sources),
+      parameters(params.camera),
+  });
+}
+
+std::vector<std::string> ViewStoreNodeParams::validate() const
+{
+  return faultsOf(*this);
+}
+
+std::vector<Parameter> parameters(HomographyTrackerNodeParams& params)
+{
+  return joined({
+      {
+          viewParameter(params.view,
+                        "stored view that is followed from the start, without a call of ~start; empty: none"),
+          real("match_period", params.match_period, "s", "> 0",
+               "time from one search for the view to the next; how it is looked for, by matching points, has the "
+               "parameters of "
+               "point_matcher under matching, for instance matching: {max_corners: 1000}"),
+      },
+      parameters(params.camera),
+      parameters(params.sessions),
+  });
+}
+
+std::vector<std::string> HomographyTrackerNodeParams::validate() const
+{
+  Faults faults;
+  faults.add(faultsOf(*this));
+  faults.add(viewFaults(view));
+  faults.add(matching.validate());
+  return faults.list();
+}
+
+}  // namespace view_servo
