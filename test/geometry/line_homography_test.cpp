@@ -116,6 +116,36 @@ TEST(LineHomography, IsEmptyWhenTheLinesLeaveItOpen)
   EXPECT_FALSE(affinityFromLines(parallel).has_value());
 }
 
+TEST(PlausibleAffinity, FitsPointsAndRefusesWhatDistortsTooMuch)
+{
+  const Eigen::Vector2d from[4] = { { 10.0, 20.0 }, { 90.0, 30.0 }, { 40.0, 80.0 }, { 70.0, 70.0 } };
+  const double weights[4] = { 1.0, 1.0, 0.3, 0.3 };
+  const auto fitted = [&](double a, double b, double c, double d) {
+    Eigen::Matrix3d map = Eigen::Matrix3d::Identity();
+    map.topRows<2>() << a, b, 5.0, c, d, -7.0;
+    Eigen::Vector2d to[4];
+    for (int i = 0; i < 4; ++i)
+    {
+      to[i] = (map * from[i].homogeneous()).head<2>();
+    }
+    const auto found = plausibleAffinity(from, to, weights, 4, AffinityLimits());
+    if (found)
+    {
+      EXPECT_LT((*found - map).norm(), 1e-9);
+    }
+    return found.has_value();
+  };
+  EXPECT_TRUE(fitted(1.2, 0.3, -0.2, 0.8));
+  EXPECT_TRUE(fitted(4.9, 0.0, 0.0, 4.9));
+  EXPECT_FALSE(fitted(5.1, 0.0, 0.0, 5.1));
+  EXPECT_FALSE(fitted(0.19, 0.0, 0.0, 0.19));
+  EXPECT_TRUE(fitted(2.2, 0.0, 0.0, 0.4));
+  EXPECT_FALSE(fitted(2.4, 0.0, 0.0, 0.4));  // 6 times as far in one direction
+  EXPECT_FALSE(fitted(-1.0, 0.0, 0.0, 1.0));
+  const Eigen::Vector2d on_a_line[3] = { { 0.0, 0.0 }, { 10.0, 10.0 }, { 20.0, 20.1 } };
+  EXPECT_FALSE(plausibleAffinity(on_a_line, on_a_line, weights, 3, AffinityLimits()).has_value());
+}
+
 TEST(LineHomography, TransferStopsAtTheHorizon)
 {
   Eigen::Matrix3d h = Eigen::Matrix3d::Identity();
