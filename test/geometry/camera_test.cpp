@@ -58,21 +58,21 @@ double roundTripError(const Camera& camera)
 
 }  // namespace
 
-TEST(Camera, projectsWithoutDistortion)
+TEST(Camera, ProjectsWithoutDistortion)
 {
   const Eigen::Vector2d pixel = pinhole().project({ 0.2, -0.1, 2.0 });
   EXPECT_NEAR(pixel.x(), 318.5 + 520.0 * 0.1, 1e-9);
   EXPECT_NEAR(pixel.y(), 242.25 - 510.0 * 0.05, 1e-9);
 }
 
-TEST(Camera, normalizesWithoutDistortion)
+TEST(Camera, NormalizesWithoutDistortion)
 {
   const Eigen::Vector2d point = pinhole().normalized({ 318.5 + 52.0, 242.25 - 51.0 });
   EXPECT_NEAR(point.x(), 0.1, 1e-12);
   EXPECT_NEAR(point.y(), -0.1, 1e-12);
 }
 
-TEST(Camera, appliesPlumbBob)
+TEST(Camera, AppliesPlumbBob)
 {
   const Camera camera = plumbBob();
   const double x = 0.3;
@@ -92,7 +92,7 @@ TEST(Camera, appliesPlumbBob)
   EXPECT_NEAR(pixel.y(), 242.25 + 510.0 * y_distorted, 1e-9);
 }
 
-TEST(Camera, appliesRationalPolynomial)
+TEST(Camera, AppliesRationalPolynomial)
 {
   Camera camera = rationalPolynomial();
   camera.distortion[2] = 0.0;  // radial only
@@ -109,21 +109,21 @@ TEST(Camera, appliesRationalPolynomial)
   EXPECT_NEAR(pixel.y(), 242.25 + 510.0 * y * radial, 1e-9);
 }
 
-TEST(Camera, normalizedInvertsProject)
+TEST(Camera, NormalizedInvertsProject)
 {
   EXPECT_LT(roundTripError(pinhole()), 1e-9);
   EXPECT_LT(roundTripError(plumbBob()), 1e-6);
   EXPECT_LT(roundTripError(rationalPolynomial()), 1e-6);
 }
 
-TEST(Camera, modelWithoutCoefficientsIsNotDistorted)
+TEST(Camera, ModelWithoutCoefficientsIsNotDistorted)
 {
   Camera camera = plumbBob();
   camera.distortion.clear();
   EXPECT_EQ(camera.project({ 0.2, -0.1, 2.0 }), pinhole().project({ 0.2, -0.1, 2.0 }));
 }
 
-TEST(Camera, givesNaNWhereThereIsNoAnswer)
+TEST(Camera, GivesNaNWhereThereIsNoAnswer)
 {
   EXPECT_FALSE(Camera().calibrated());
   EXPECT_TRUE(Camera().normalized({ 1.0, 2.0 }).hasNaN());
@@ -133,7 +133,7 @@ TEST(Camera, givesNaNWhereThereIsNoAnswer)
   EXPECT_TRUE(pinhole().normalized({ std::nan(""), 1.0 }).hasNaN());
 }
 
-TEST(Camera, givesNaNBeyondTheLargestImageOfABarrelDistortion)
+TEST(Camera, GivesNaNBeyondTheLargestImageOfABarrelDistortion)
 {
   Camera camera = pinhole();
   camera.distortion_model = "plumb_bob";
@@ -143,7 +143,7 @@ TEST(Camera, givesNaNBeyondTheLargestImageOfABarrelDistortion)
   EXPECT_FALSE(camera.normalized({ 318.5 + 280.0, 242.25 }).hasNaN());
 }
 
-TEST(Camera, refusesOtherModels)
+TEST(Camera, RefusesOtherModels)
 {
   Camera camera = pinhole();
   camera.distortion_model = "equidistant";

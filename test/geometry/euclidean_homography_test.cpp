@@ -2,7 +2,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "view_servo/geometry/euclidean_homography.h"
 
-#include "../support/synthetic_scene.h"
+#include "support/synthetic_scene.h"
 
 #include <gtest/gtest.h>
 #include <Eigen/Geometry>

@@ -3,7 +3,7 @@
 #include "view_servo/geometry/fundamental.h"
 
 #include "../../src/geometry/residuals.h"
-#include "../support/synthetic_scene.h"
+#include "support/synthetic_scene.h"
 
 #include <gtest/gtest.h>
 #include <rapidcheck/gtest.h>

@@ -4,7 +4,7 @@
 
 #include "../../src/geometry/levenberg_marquardt.h"
 #include "../../src/geometry/residuals.h"
-#include "../support/synthetic_scene.h"
+#include "support/synthetic_scene.h"
 
 #include <gtest/gtest.h>
 #include <rapidcheck/gtest.h>

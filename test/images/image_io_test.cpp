@@ -94,13 +94,13 @@ private:
 
 }  // namespace
 
-TEST(ToGrey, sharesGreyImages)
+TEST(ToGrey, SharesGreyImages)
 {
   const cv::Mat image = randomImage(CV_8UC1);
   EXPECT_EQ(toGrey(image, "image").data, image.data);
 }
 
-TEST(ToGrey, weighsColours)
+TEST(ToGrey, WeighsColours)
 {
   const cv::Mat blue(20, 20, CV_8UC3, cv::Scalar(255, 0, 0));
   const cv::Mat green(20, 20, CV_8UC3, cv::Scalar(0, 255, 0));
@@ -109,7 +109,7 @@ TEST(ToGrey, weighsColours)
   EXPECT_EQ(toGrey(green, "image").at<uchar>(3, 3), 150);
 }
 
-TEST(ToGrey, ignoresTransparency)
+TEST(ToGrey, IgnoresTransparency)
 {
   const cv::Mat image = randomImage(CV_8UC4);
   cv::Mat opaque;
@@ -117,7 +117,7 @@ TEST(ToGrey, ignoresTransparency)
   EXPECT_EQ(difference(toGrey(image, "image"), toGrey(opaque, "image")), 0.0);
 }
 
-TEST(ToGrey, mapsTheWhole16BitRange)
+TEST(ToGrey, MapsTheWhole16BitRange)
 {
   cv::Mat image(16, 16, CV_16UC1, cv::Scalar(65535));
   image.at<ushort>(0, 0) = 0;
@@ -129,7 +129,7 @@ TEST(ToGrey, mapsTheWhole16BitRange)
   EXPECT_EQ(grey.at<uchar>(5, 5), 255);
 }
 
-TEST(ToGrey, refusesOtherTypes)
+TEST(ToGrey, RefusesOtherTypes)
 {
   EXPECT_THROW(toGrey(cv::Mat(), "image"), ImageError);
   EXPECT_THROW(toGrey(cv::Mat(20, 20, CV_32FC1, cv::Scalar(0.5)), "image"), ImageError);
@@ -137,7 +137,7 @@ TEST(ToGrey, refusesOtherTypes)
   EXPECT_THROW(toGrey(cv::Mat(20, 20, CV_8UC2, cv::Scalar(1, 1)), "image"), ImageError);
 }
 
-TEST(ToGrey, refusesSizesBeyondTheLimits)
+TEST(ToGrey, RefusesSizesBeyondTheLimits)
 {
   EXPECT_NO_THROW(toGrey(randomImage(CV_8UC1, { 16, 16 }), "image"));
   EXPECT_THROW(toGrey(randomImage(CV_8UC1, { 15, 200 }), "image"), ImageError);
@@ -146,7 +146,7 @@ TEST(ToGrey, refusesSizesBeyondTheLimits)
   EXPECT_THROW(toGrey(cv::Mat(5001, 10000, CV_8UC1), "image"), ImageError);
 }
 
-TEST_F(ImageIo, readsGreyLosslessly)
+TEST_F(ImageIo, ReadsGreyLosslessly)
 {
   const cv::Mat image = randomImage(CV_8UC1);
   EXPECT_EQ(difference(readGreyImage(writeImage("grey.png", image)), image), 0.0);
@@ -155,7 +155,7 @@ TEST_F(ImageIo, readsGreyLosslessly)
   EXPECT_EQ(difference(readGreyImage(writeImage("grey.tiff", image)), image), 0.0);
 }
 
-TEST_F(ImageIo, readsPnmWithComments)
+TEST_F(ImageIo, ReadsPnmWithComments)
 {
   const std::string pixels(20 * 16, 'x');
   const cv::Mat image = readGreyImage(writeBytes("a.pgm", "P5\n# made by hand\n20 # wide\n16\n255\n" + pixels));
@@ -163,7 +163,7 @@ TEST_F(ImageIo, readsPnmWithComments)
   EXPECT_EQ(image.at<uchar>(0, 0), 'x');
 }
 
-TEST_F(ImageIo, convertsWhatItReads)
+TEST_F(ImageIo, ConvertsWhatItReads)
 {
   for (const int type : { CV_8UC3, CV_8UC4, CV_16UC1, CV_16UC3, CV_16UC4 })
   {
@@ -174,7 +174,7 @@ TEST_F(ImageIo, convertsWhatItReads)
   }
 }
 
-TEST_F(ImageIo, readsGreyWithAlpha)
+TEST_F(ImageIo, ReadsGreyWithAlpha)
 {
   // OpenCV writes no such files, so here is one: 16 x 16 pixels of grey 100 and alpha 255.
   static constexpr std::array<unsigned char, 75> png{
@@ -187,7 +187,7 @@ TEST_F(ImageIo, readsGreyWithAlpha)
   EXPECT_EQ(difference(grey, cv::Mat(16, 16, CV_8UC1, cv::Scalar(100))), 0.0);
 }
 
-TEST_F(ImageIo, readsJpeg)
+TEST_F(ImageIo, ReadsJpeg)
 {
   cv::Mat image;
   cv::GaussianBlur(randomImage(CV_8UC3, { 200, 100 }), image, cv::Size(), 4.0);
@@ -196,14 +196,14 @@ TEST_F(ImageIo, readsJpeg)
   EXPECT_LT(difference(readGreyImage(path("progressive.jpg")), toGrey(image, "image")), 8.0);
 }
 
-TEST_F(ImageIo, refusesWhatIsNotAFile)
+TEST_F(ImageIo, RefusesWhatIsNotAFile)
 {
   expectRefused(path("nothing.png"), "No such file");
   expectRefused(path("."), "not a file");
   expectRefused("/dev/zero", "not a file");
 }
 
-TEST_F(ImageIo, refusesFilesItMayNotRead)
+TEST_F(ImageIo, RefusesFilesItMayNotRead)
 {
   if (geteuid() == 0)
   {
@@ -214,7 +214,7 @@ TEST_F(ImageIo, refusesFilesItMayNotRead)
   expectRefused(file, "ermission denied");
 }
 
-TEST_F(ImageIo, refusesWhatIsNotAnImage)
+TEST_F(ImageIo, RefusesWhatIsNotAnImage)
 {
   expectRefused(writeBytes("empty.png", ""), "not an image");
   expectRefused(writeBytes("text.png", "a b c\n"), "not an image");
@@ -223,7 +223,7 @@ TEST_F(ImageIo, refusesWhatIsNotAnImage)
   expectRefused(writeBytes("signature.jpg", "\xFF\xD8\xFF"), "not an image");
 }
 
-TEST_F(ImageIo, refusesImagesCutShort)
+TEST_F(ImageIo, RefusesImagesCutShort)
 {
   for (const std::string extension : { ".png", ".jpg", ".pgm" })
   {
@@ -233,18 +233,18 @@ TEST_F(ImageIo, refusesImagesCutShort)
   }
 }
 
-TEST_F(ImageIo, refusesFloatImages)
+TEST_F(ImageIo, RefusesFloatImages)
 {
   expectRefused(writeImage("float.tiff", cv::Mat(20, 20, CV_32FC1, cv::Scalar(0.5))), "neither 8 nor 16 bits");
 }
 
-TEST_F(ImageIo, refusesTinyImages)
+TEST_F(ImageIo, RefusesTinyImages)
 {
   expectRefused(writeImage("tiny.png", randomImage(CV_8UC1, { 1, 1 })), "1 x 1");
   expectRefused(writeImage("narrow.bmp", randomImage(CV_8UC1, { 200, 2 })), "200 x 2");
 }
 
-TEST_F(ImageIo, refusesHugeImagesByTheirHeaderAlone)
+TEST_F(ImageIo, RefusesHugeImagesByTheirHeaderAlone)
 {
   // Only headers: had anything been decoded, these would be called damaged.
   using namespace std::string_literals;
@@ -256,7 +256,7 @@ TEST_F(ImageIo, refusesHugeImagesByTheirHeaderAlone)
   expectRefused(writeBytes("overflow.pgm", "P5\n4294967297 4294967297\n255\n"), "over 50 megapixels");
 }
 
-TEST_F(ImageIo, refusesHugeImagesOfOtherFormats)
+TEST_F(ImageIo, RefusesHugeImagesOfOtherFormats)
 {
   expectRefused(writeImage("huge.bmp", cv::Mat(5001, 10000, CV_8UC1, cv::Scalar(0))), "over 50 megapixels");
 }

@@ -2,7 +2,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "view_servo/robust/multi_hypothesis.h"
 
-#include "../support/synthetic_scene.h"
+#include "support/synthetic_scene.h"
 #include "view_servo/geometry/fundamental.h"
 #include "view_servo/geometry/homography.h"
 #include "view_servo/matching/assignment.h"

@@ -5,7 +5,7 @@
 #include "view_servo/robust/fundamental_estimator.h"
 #include "view_servo/robust/homography_estimator.h"
 
-#include "../support/synthetic_scene.h"
+#include "support/synthetic_scene.h"
 
 #include <gtest/gtest.h>
 #include <rapidcheck/gtest.h>

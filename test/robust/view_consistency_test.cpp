@@ -2,7 +2,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "view_servo/robust/view_consistency.h"
 
-#include "../support/synthetic_scene.h"
+#include "support/synthetic_scene.h"
 
 #include <gtest/gtest.h>
 #include <rapidcheck/gtest.h>

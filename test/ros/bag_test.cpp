@@ -2,13 +2,15 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // Matching on recorded runs, image by image, each compared with where the camera truly was.
 #include "sim/world.h"
+
+#include "support/corner_error.h"
 #include "support/recorded_bag.h"
 #include "support/temporary_directory.h"
+#include "test_paths.h"
 #include "view_servo/geometry/homography.h"
 #include "view_servo/views/line_view_matcher.h"
-#include "view_servo/views/prepared_image.h"
 #include "view_servo/views/point_view_matcher.h"
-#include "test_paths.h"
+#include "view_servo/views/prepared_image.h"
 
 #include <gtest/gtest.h>
 
@@ -99,19 +101,6 @@ Eigen::Matrix3d trueHomography(const Frame& reference, const Frame& current)
     return Eigen::Matrix3d(frame.camera.k * columns);
   };
   return image_from_plane(current) * image_from_plane(reference).inverse();
-}
-
-double meanCornerError(const Eigen::Matrix3d& h, const Eigen::Matrix3d& truth, const cv::Size& size)
-{
-  double sum = 0.0;
-  for (const double u : { 0.0, size.width - 1.0 })
-  {
-    for (const double v : { 0.0, size.height - 1.0 })
-    {
-      sum += (transfer(h, { u, v }) - transfer(truth, { u, v })).norm();
-    }
-  }
-  return sum / 4.0;
 }
 
 /** Either an answer, or nothing that could be taken for one and a reason. @return whether it is an answer. */
@@ -272,7 +261,7 @@ TEST(Bag, HomographiesOfAPlaneAreTheTrueOnes)
     {
       const ViewMatch result =
           match(matcher, prepared(reference, matcher), prepared(frame, matcher), GeometryModel::HOMOGRAPHY);
-      EXPECT_LT(meanCornerError(result.matrix, trueHomography(reference, frame), frame.image.size()), 0.5)
+      EXPECT_LT(test::cornerError(result.matrix, trueHomography(reference, frame), frame.image.size()), 0.5)
           << "at " << frame.time << " s: " << result.message;
     }
   };

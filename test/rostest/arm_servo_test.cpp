@@ -2,11 +2,11 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "driver_cases.h"
 
+#include "test_paths.h"
 #include "view_servo/Homography.h"
 #include "view_servo/ServoError.h"
 #include "view_servo/ServoToViewAction.h"
 #include "view_servo/tracking/plane_tracker.h"
-#include "test_paths.h"
 
 #include <geometry_msgs/TwistStamped.h>
 #include <sensor_msgs/JointState.h>
@@ -367,7 +367,7 @@ int main(int argc, char** argv)
   return view_servo::test::runDriverTests(argc, argv, "arm_servo_test", "driving/servo_25d", [] {
     view_servo::StoredView view;
     view.name = "goal";
-    view.image = view_servo::test::makePicture(1);
+    view.image = view_servo::test::texturedPicture(1);
     view.region = view_servo::test::REGION;
     return view;
   });

@@ -4,11 +4,11 @@
 #include "node_test.h"
 #include "support/temporary_directory.h"
 
+#include "test_paths.h"
 #include "view_servo/Homography.h"
 #include "view_servo/SetView.h"
 #include "view_servo/WantedView.h"
 #include "view_servo/views/view_store.h"
-#include "test_paths.h"
 
 #include <gtest/gtest.h>
 #include <sensor_msgs/Image.h>
@@ -116,7 +116,7 @@ protected:
     view.image = picture();
     store.save(view, true);
     view.name = "large";
-    view.image = makePicture(1, cv::Size(640, 480));
+    view.image = texturedPicture(1, cv::Size(640, 480));
     store.save(view, true);
     view.name = "plain";
     view.image = cv::Mat(picture().size(), CV_8UC1, cv::Scalar(100));
@@ -148,7 +148,7 @@ protected:
 
   static cv::Mat picture()
   {
-    return makePicture(1);
+    return texturedPicture(1);
   }
   static cv::Mat blank()
   {
@@ -550,7 +550,7 @@ TEST_F(TrackerProcessTest, FollowsItsParameterUntilADriverWantsAnother)
 
 TEST_F(TrackerProcessTest, EndsAtOnceWhileItLooksForTheView)
 {
-  camera_.show(makePicture(9));
+  camera_.show(texturedPicture(9));
   ChildProcess node(command("ending", { "_match_period:=0.001", "_view:=goal" }), output());
   const Recorder<Homography> homographies("ending/homography");
   ASSERT_TRUE(waitForAnswer(homographies, "", [](const Homography& message) {

@@ -4,13 +4,13 @@
 #include "node_test.h"
 #include "support/temporary_directory.h"
 
+#include "test_paths.h"
 #include "view_servo/LineMatches.h"
 #include "view_servo/ListViews.h"
 #include "view_servo/MatchPoints.h"
 #include "view_servo/PointMatches.h"
 #include "view_servo/SaveView.h"
 #include "view_servo/SetView.h"
-#include "test_paths.h"
 
 #include <gtest/gtest.h>
 
@@ -55,7 +55,7 @@ protected:
   void expectToStopAtOnceWhileMatching(const std::string& program, const std::string& topic) const
   {
     const std::string name = "stopped_" + topic;
-    const cv::Mat picture = makePicture(1);
+    const cv::Mat picture = texturedPicture(1);
     ChildProcess node({ program, "__name:=" + name, views(), "_rate:=100.0", "image_raw:=camera/image_raw",
                         "camera_info:=camera/camera_info" },
                       output());
@@ -90,7 +90,7 @@ protected:
 
 TEST_F(LifecycleTest, ViewsSurviveARestart)
 {
-  const cv::Mat picture = makePicture(1);
+  const cv::Mat picture = texturedPicture(1);
   {
     ChildProcess node({ VIEW_STORE, "__name:=view_store_one", views() }, output());
     ASSERT_TRUE(waitForService("view_store_one/save")) << node.output();
@@ -133,7 +133,7 @@ TEST_F(LifecycleTest, KeepsViewsInRosHomeByDefault)
   ASSERT_TRUE(waitForService("view_store_home/save")) << node.output();
   SaveView::Request request;
   request.name = "wall";
-  request.source.image = toMono8(makePicture(1));
+  request.source.image = toMono8(texturedPicture(1));
   SaveView::Response response;
   ASSERT_TRUE(ros::service::call("view_store_home/save", request, response));
   EXPECT_TRUE(response.success) << response.message;

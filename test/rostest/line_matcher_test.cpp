@@ -148,7 +148,7 @@ protected:
   }
 
   TemporaryDirectory directory_;
-  const cv::Mat picture_ = makePicture(1);
+  const cv::Mat picture_ = texturedPicture(1);
   const cv::Mat seen_ = warped(picture_, exampleHomography());
   FakeCamera camera_{ "camera" };
   Recorder<LineMatches> matches_{ "line_matcher/line_matches" };
@@ -263,7 +263,7 @@ TEST_F(LineMatcherTest, MatchesStoredViews)
   expectPlane(call(request));
 
   // The node keeps views in memory; one that is saved anew counts all the same.
-  saveView("wall", makePicture(2));
+  saveView("wall", texturedPicture(2));
   EXPECT_FALSE(call(request).success);
   saveView("wall", picture_);
   expectPlane(call(request));
@@ -272,7 +272,7 @@ TEST_F(LineMatcherTest, MatchesStoredViews)
 TEST_F(LineMatcherTest, FindsNoPlaneInUnrelatedImages)
 {
   MatchLines::Request request = goodRequest();
-  request.query.image = toMono8(makePicture(7));
+  request.query.image = toMono8(texturedPicture(7));
   const MatchLines::Response response = call(request);
   EXPECT_FALSE(response.success) << response.message;
   EXPECT_TRUE(response.plane_homographies.empty());

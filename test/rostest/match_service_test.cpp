@@ -44,7 +44,7 @@ protected:
     removeViews("open/point_matcher");
   }
 
-  MatchServiceTest() : picture_(makePicture(1)), seen_(warped(picture_, exampleHomography()))
+  MatchServiceTest() : picture_(texturedPicture(1)), seen_(warped(picture_, exampleHomography()))
   {
   }
 
@@ -235,7 +235,7 @@ TEST_F(MatchServiceTest, MatchesStoredViews)
   expectHomography(call(request, MATCH_WITHOUT_PATHS));
 
   // The node keeps views in memory; one that is saved anew counts all the same.
-  saveView("wall", makePicture(2));
+  saveView("wall", texturedPicture(2));
   EXPECT_FALSE(call(request).success);
   saveView("wall", picture_);
   expectHomography(call(request));
@@ -281,7 +281,7 @@ TEST_F(MatchServiceTest, RefusesBadInputAndGoesOn)
     { "1x1", query(file("dot.png", cv::Mat(1, 1, CV_8UC1, cv::Scalar(9)))), "dot.png" },
     { "too large", query(large), "large.pgm" },
     { "constant", query(file("constant.png", cv::Mat(360, 480, CV_8UC1, cv::Scalar(90)))), "" },
-    { "unrelated", query(file("unrelated.png", makePicture(7))), "" },
+    { "unrelated", query(file("unrelated.png", texturedPicture(7))), "" },
     { "mirrored", query(mirrored), "" },
     { "unknown view", view("nobody"), "nobody" },
     { "name with ../", view("../wall"), "../wall" },

@@ -2,6 +2,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include "support/corner_error.h"
+#include "support/textured_plane.h"
 #include "view_servo/ros/conversions.h"
 
 #include <gtest/gtest.h>
@@ -118,37 +120,6 @@ private:
   ros::Subscriber subscriber_;
 };
 
-/** A textured plane, another one for each seed: patches of many sizes and greys on a slowly varying ground. */
-inline cv::Mat makePicture(std::uint64_t seed, const cv::Size& size = cv::Size(480, 360))
-{
-  cv::RNG rng(seed);
-  cv::Mat picture(size, CV_8UC1, cv::Scalar(128));
-  for (int i = 0; i < 220; ++i)
-  {
-    const cv::Point2f centre(rng.uniform(0.0F, static_cast<float>(size.width)),
-                             rng.uniform(0.0F, static_cast<float>(size.height)));
-    const cv::Size2f sides(rng.uniform(8.0F, 70.0F), rng.uniform(8.0F, 70.0F));
-    const cv::RotatedRect patch(centre, sides, rng.uniform(0.0F, 180.0F));
-    cv::Point2f corners[4];
-    patch.points(corners);
-    std::vector<cv::Point> polygon(corners, corners + 4);
-    cv::fillConvexPoly(picture, polygon, cv::Scalar(rng.uniform(0, 256)), cv::LINE_AA);
-  }
-  cv::Mat noise(size, CV_8UC1);
-  rng.fill(noise, cv::RNG::NORMAL, 20.0, 4.0);
-  cv::Mat result;
-  cv::GaussianBlur(picture + noise - cv::Scalar(20), result, cv::Size(), 0.8);
-  return result;
-}
-
-/** Reference -> current: a turn, a change of size and some perspective. */
-inline Eigen::Matrix3d exampleHomography()
-{
-  Eigen::Matrix3d h;
-  h << 0.87, -0.12, 50.0, 0.09, 0.93, -5.0, -2e-4, 1e-4, 1.0;
-  return h;
-}
-
 /** The picture seen through `h`, on grey ground, under another light. */
 inline cv::Mat warped(const cv::Mat& picture, const Eigen::Matrix3d& h)
 {
@@ -164,24 +135,6 @@ template <typename Array>
 Eigen::Matrix3d toMatrix(const Array& rows)
 {
   return Eigen::Map<const Eigen::Matrix<double, 3, 3, Eigen::RowMajor>>(rows.data());
-}
-
-/** Mean distance between the picture's corners under the two homographies [px]; NaN for a NaN matrix. */
-inline double cornerError(const Eigen::Matrix3d& estimated, const Eigen::Matrix3d& truth,
-                          const cv::Size& size = cv::Size(480, 360))
-{
-  double sum = 0.0;
-  for (const double u : { 0.0, size.width - 1.0 })
-  {
-    for (const double v : { 0.0, size.height - 1.0 })
-    {
-      const Eigen::Vector3d corner(u, v, 1.0);
-      const Eigen::Vector3d a = estimated * corner;
-      const Eigen::Vector3d b = truth * corner;
-      sum += (a.head<2>() / a.z() - b.head<2>() / b.z()).norm();
-    }
-  }
-  return sum / 4.0;
 }
 
 inline sensor_msgs::Image toMono8(const cv::Mat& image)

@@ -92,7 +92,7 @@ protected:
   }
 
   ros::NodeHandle nh_;
-  const cv::Mat picture_ = makePicture(1);
+  const cv::Mat picture_ = texturedPicture(1);
   FakeCamera camera_;
   ros::Publisher clock_publisher_;
   ros::Publisher odometry_publisher_;
@@ -119,7 +119,7 @@ int main(int argc, char** argv)
   return view_servo::test::runDriverTests(argc, argv, "paused_clock_test", "homing", [] {
     view_servo::StoredView view;
     view.name = "goal";
-    view.image = view_servo::test::makePicture(1);
+    view.image = view_servo::test::texturedPicture(1);
     return view;
   });
 }

@@ -61,7 +61,7 @@ protected:
 
   ros::Publisher clock_;
   FakeCamera camera_{ "camera" };
-  const cv::Mat picture_ = makePicture(1);
+  const cv::Mat picture_ = texturedPicture(1);
   const cv::Mat seen_ = warped(picture_, exampleHomography());
 };
 

@@ -166,7 +166,7 @@ protected:
 
   Robot left_{ "left" };
   Robot right_{ "right" };
-  const cv::Mat picture_ = makePicture(1);
+  const cv::Mat picture_ = texturedPicture(1);
   const cv::Mat seen_ = warped(picture_, exampleHomography());
 };
 
@@ -196,7 +196,7 @@ TEST_F(StreamingTest, SaysSoWhenTheViewIsNotSeen)
 {
   left_.teach("wall", picture_);
   ASSERT_TRUE(left_.setView("wall").success);
-  const cv::Mat other = makePicture(5);
+  const cv::Mat other = texturedPicture(5);
   ASSERT_TRUE(waitUntil([&] { return left_.matches.last() && !left_.matches.last()->homography.valid; },
                         [&] { left_.send(other); }));
   EXPECT_EQ(left_.matches.last()->homography.state, Homography::SEARCHING);
@@ -237,7 +237,7 @@ TEST_F(StreamingTest, KeepsTwoNamespacesApart)
 TEST_F(StreamingTest, FollowsSetView)
 {
   left_.teach("wall", picture_);
-  left_.teach("poster", makePicture(3));
+  left_.teach("poster", texturedPicture(3));
   ASSERT_TRUE(left_.setView("wall").success);
   EXPECT_FALSE(left_.setView("nobody").success);
   EXPECT_NE(left_.setView("nobody").message.find("nobody"), std::string::npos);
@@ -335,7 +335,7 @@ TEST_F(StreamingTest, GoesOnWhenTheViewDisappears)
 TEST_F(StreamingTest, MatchesTheViewThatADriverWants)
 {
   left_.teach("wall", picture_);
-  left_.teach("poster", makePicture(3));
+  left_.teach("poster", texturedPicture(3));
   left_.want("wall", "goal 1");
   const auto send = [&] {
     left_.send(seen_);
@@ -395,7 +395,7 @@ TEST_F(StreamingTest, RefusesAViewThatCannotBeMatched)
   left_.expectRefusal("broken", "damaged", "broken");
   StoredView large;
   large.name = "large";
-  large.image = makePicture(1, cv::Size(640, 480));
+  large.image = texturedPicture(1, cv::Size(640, 480));
   ViewStore(views).save(large, true);
   const auto send = [&] {
     left_.send(seen_);

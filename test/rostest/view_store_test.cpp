@@ -75,7 +75,7 @@ protected:
   }
 
   FakeCamera camera_{ "camera" };
-  const cv::Mat picture_ = makePicture(1);
+  const cv::Mat picture_ = texturedPicture(1);
 };
 
 TEST_F(ViewStoreNodeTest, StoresTheCameraImageWithAllThatIsKnown)
@@ -189,7 +189,7 @@ TEST_F(ViewStoreNodeTest, OverwritesOnlyWhenAsked)
 {
   ASSERT_TRUE(call<SaveView>("save", imageRequest("once")).success);
   SaveView::Request request = imageRequest("once");
-  request.source.image = toMono8(makePicture(2));
+  request.source.image = toMono8(texturedPicture(2));
   request.overwrite = false;
   expectRefusal(call<SaveView>("save", request), "once");
   EXPECT_EQ(get("once").image.data, toMono8(picture_).data);

@@ -203,7 +203,7 @@ void expectNamed(const std::string& message, const std::string& name)
   EXPECT_NE(message.find(name), std::string::npos) << "\"" << message << "\" does not name " << name;
 }
 
-TEST(PumaTest, posesAreThoseOfItsDenavitHartenbergTable)
+TEST(PumaTest, PosesAreThoseOfItsDenavitHartenbergTable)
 {
   const Puma puma = makePuma();
   Rng rng(1);
@@ -214,7 +214,7 @@ TEST(PumaTest, posesAreThoseOfItsDenavitHartenbergTable)
   }
 }
 
-TEST(PumaTest, startsAtRest)
+TEST(PumaTest, StartsAtRest)
 {
   const Puma puma = makePuma();
   EXPECT_EQ(puma.jointNames(),
@@ -225,7 +225,7 @@ TEST(PumaTest, startsAtRest)
   EXPECT_EQ(puma.message(), "");
 }
 
-TEST(PumaTest, looksWhereTheUrdfSays)
+TEST(PumaTest, LooksWhereTheUrdfSays)
 {
   const Puma puma = makePuma();
   const Eigen::Isometry3d forward = puma.nominalCameraPose(FORWARD);
@@ -240,7 +240,7 @@ TEST(PumaTest, looksWhereTheUrdfSays)
   EXPECT_GT(manipulability(puma, DOWN), 5.0 * PumaParams().min_manipulability);
 }
 
-TEST(PumaTest, cameraMovesAsCommanded)
+TEST(PumaTest, CameraMovesAsCommanded)
 {
   Rng rng(2);
   for (int i = 0; i < 20; ++i)
@@ -266,7 +266,7 @@ TEST(PumaTest, cameraMovesAsCommanded)
   }
 }
 
-TEST(PumaTest, cameraMovesAlongEachAxisAsCommanded)
+TEST(PumaTest, CameraMovesAlongEachAxisAsCommanded)
 {
   for (int axis = 0; axis < 6; ++axis)
   {
@@ -282,7 +282,7 @@ TEST(PumaTest, cameraMovesAlongEachAxisAsCommanded)
   }
 }
 
-TEST(PumaTest, theWayDoesNotDependOnTheLengthOfSteps)
+TEST(PumaTest, TheWayDoesNotDependOnTheLengthOfSteps)
 {
   Puma fine = makePuma();
   Puma coarse = makePuma();
@@ -304,7 +304,7 @@ TEST(PumaTest, theWayDoesNotDependOnTheLengthOfSteps)
   EXPECT_LT((fine.joints() - coarse.joints()).norm(), 1e-3);
 }
 
-TEST(PumaTest, stopsWithinTheAccelerationLimit)
+TEST(PumaTest, StopsWithinTheAccelerationLimit)
 {
   Puma puma = makePuma();
   puma.setJoints(FORWARD);
@@ -327,7 +327,7 @@ TEST(PumaTest, stopsWithinTheAccelerationLimit)
   EXPECT_EQ(puma.velocities(), Joints::Zero());
 }
 
-TEST(PumaTest, neverExceedsAnyLimit)
+TEST(PumaTest, NeverExceedsAnyLimit)
 {
   Rng rng(3);
   std::array<int, 4> times{};
@@ -370,7 +370,7 @@ TEST(PumaTest, neverExceedsAnyLimit)
   EXPECT_GT(*std::min_element(ends.begin(), ends.end()), 100);
 }
 
-TEST(PumaTest, slowsDownAtAVelocityLimitInTheSameDirection)
+TEST(PumaTest, SlowsDownAtAVelocityLimitInTheSameDirection)
 {
   Puma puma = makePuma();
   puma.setJoints(FORWARD);
@@ -388,7 +388,7 @@ TEST(PumaTest, slowsDownAtAVelocityLimitInTheSameDirection)
   expectNamed(puma.message(), "velocity limit of joint");
 }
 
-TEST(PumaTest, stopsAtEveryEndNamesItAndLeavesItAgain)
+TEST(PumaTest, StopsAtEveryEndNamesItAndLeavesItAgain)
 {
   for (int joint = 0; joint < Puma::JOINTS; ++joint)
   {
@@ -421,7 +421,7 @@ TEST(PumaTest, stopsAtEveryEndNamesItAndLeavesItAgain)
   }
 }
 
-TEST(PumaTest, cameraStaysOnItsPathUntilTheEnd)
+TEST(PumaTest, CameraStaysOnItsPathUntilTheEnd)
 {
   Rng rng(5);
   int stops = 0;
@@ -444,7 +444,7 @@ TEST(PumaTest, cameraStaysOnItsPathUntilTheEnd)
   EXPECT_GE(stops, 5);
 }
 
-TEST(PumaTest, atAnEndItFollowsTwistsThatDoNotNeedThatJoint)
+TEST(PumaTest, AtAnEndItFollowsTwistsThatDoNotNeedThatJoint)
 {
   Puma puma = makePuma();
   Joints start = DOWN;
@@ -457,7 +457,7 @@ TEST(PumaTest, atAnEndItFollowsTwistsThatDoNotNeedThatJoint)
   EXPECT_GT(puma.cameraPose().translation().z() - puma.nominalCameraPose(start).translation().z(), 0.02);
 }
 
-TEST(PumaTest, slowsDownAndReportsWhereItIsSingular)
+TEST(PumaTest, SlowsDownAndReportsWhereItIsSingular)
 {
   const Joints wrist = (Joints() << 0.3, 1.0, -2.8, 0.2, 0.0, 0.1).finished();
   const Joints elbow = (Joints() << 0.3, 0.5, -M_PI_2 + std::atan2(0.0203, 0.4318), 0.2, 0.8, 0.1).finished();
@@ -481,7 +481,7 @@ TEST(PumaTest, slowsDownAndReportsWhereItIsSingular)
   }
 }
 
-TEST(PumaTest, slowsDownOnTheWayIntoTheStretchedArm)
+TEST(PumaTest, SlowsDownOnTheWayIntoTheStretchedArm)
 {
   Puma puma = makePuma();
   const Joints start = (Joints() << 0.0, 0.6, -2.0, 0.0, 0.5, 0.0).finished();
@@ -507,7 +507,7 @@ TEST(PumaTest, slowsDownOnTheWayIntoTheStretchedArm)
   EXPECT_LT(distance(before, puma.cameraPose()) / DT, 0.05);
 }
 
-TEST(PumaTest, isDampedNearSingularitiesAsTheParametersSay)
+TEST(PumaTest, IsDampedNearSingularitiesAsTheParametersSay)
 {
   PumaParams params;
   const Joints joints = (Joints() << 0.3, 1.2, -3.1, 0.2, 0.02, 0.1).finished();
@@ -526,7 +526,7 @@ TEST(PumaTest, isDampedNearSingularitiesAsTheParametersSay)
   EXPECT_NEAR(twistBetween(before, puma.cameraPose(), DT).dot(twist) / twist.squaredNorm(), part, 0.01 * part);
 }
 
-TEST(PumaTest, isNotDampedAwayFromSingularities)
+TEST(PumaTest, IsNotDampedAwayFromSingularities)
 {
   PumaParams params;
   params.damping = 0.0;
@@ -541,7 +541,7 @@ TEST(PumaTest, isNotDampedAwayFromSingularities)
   EXPECT_EQ(undamped.joints(), damped.joints());
 }
 
-TEST(PumaTest, reachesCameraPosesThatJointsGave)
+TEST(PumaTest, ReachesCameraPosesThatJointsGave)
 {
   Rng rng(7);
   PumaParams params;
@@ -568,7 +568,7 @@ TEST(PumaTest, reachesCameraPosesThatJointsGave)
   }
 }
 
-TEST(PumaTest, takesTheNearestSolution)
+TEST(PumaTest, TakesTheNearestSolution)
 {
   Rng rng(8);
   Puma puma = makePuma();
@@ -594,7 +594,7 @@ TEST(PumaTest, takesTheNearestSolution)
   EXPECT_LT((puma.joints() - goal).norm(), 1e-6);
 }
 
-TEST(PumaTest, staysWhereThePoseIsItsOwn)
+TEST(PumaTest, StaysWhereThePoseIsItsOwn)
 {
   Rng rng(9);
   Puma puma = makePuma();
@@ -608,7 +608,7 @@ TEST(PumaTest, staysWhereThePoseIsItsOwn)
   }
 }
 
-TEST(PumaTest, refusesUnreachablePosesAndChangesNothing)
+TEST(PumaTest, RefusesUnreachablePosesAndChangesNothing)
 {
   Puma puma = makePuma();
   puma.setJoints(FORWARD);
@@ -638,7 +638,7 @@ TEST(PumaTest, refusesUnreachablePosesAndChangesNothing)
   EXPECT_LT((puma.velocities() - velocities).norm(), 0.01);
 }
 
-TEST(PumaTest, refusesTwistsThatAreNotFiniteAndKeepsTheFormer)
+TEST(PumaTest, RefusesTwistsThatAreNotFiniteAndKeepsTheFormer)
 {
   Puma puma = makePuma();
   Puma undisturbed = makePuma();
@@ -663,7 +663,7 @@ TEST(PumaTest, refusesTwistsThatAreNotFiniteAndKeepsTheFormer)
   EXPECT_EQ(puma.joints(), undisturbed.joints());
 }
 
-TEST(PumaTest, survivesEnormousAndTinyTwists)
+TEST(PumaTest, SurvivesEnormousAndTinyTwists)
 {
   for (const double size : { std::numeric_limits<double>::max(), 1e100, 1e-100, 1e-310 })
   {
@@ -678,7 +678,7 @@ TEST(PumaTest, survivesEnormousAndTinyTwists)
   }
 }
 
-TEST(PumaTest, refusesTimesThatItCannotMoveOn)
+TEST(PumaTest, RefusesTimesThatItCannotMoveOn)
 {
   Puma puma = makePuma();
   for (const double dt :
@@ -688,7 +688,7 @@ TEST(PumaTest, refusesTimesThatItCannotMoveOn)
   }
 }
 
-TEST(PumaTest, refusesJointsBeyondTheirLimitsByName)
+TEST(PumaTest, RefusesJointsBeyondTheirLimitsByName)
 {
   Puma puma = makePuma();
   puma.setJoints(FORWARD);
@@ -712,7 +712,7 @@ TEST(PumaTest, refusesJointsBeyondTheirLimitsByName)
   }
 }
 
-TEST(PumaTest, handEyeErrorIsAsLargeAsAskedForAndConstant)
+TEST(PumaTest, HandEyeErrorIsAsLargeAsAskedForAndConstant)
 {
   PumaParams params;
   params.hand_eye_translation_error = 0.013;
@@ -736,7 +736,7 @@ TEST(PumaTest, handEyeErrorIsAsLargeAsAskedForAndConstant)
   EXPECT_LT(mean.norm(), 0.5);  // other seeds give other directions
 }
 
-TEST(PumaTest, withHandEyeErrorTheNominalCameraMovesAsCommanded)
+TEST(PumaTest, WithHandEyeErrorTheNominalCameraMovesAsCommanded)
 {
   PumaParams params;
   params.hand_eye_translation_error = 0.05;
@@ -753,7 +753,7 @@ TEST(PumaTest, withHandEyeErrorTheNominalCameraMovesAsCommanded)
   EXPECT_GT((twistBetween(camera, puma.cameraPose(), DT) - twist).norm(), 0.01);
 }
 
-TEST(PumaTest, encodersHaveTheNoiseAskedFor)
+TEST(PumaTest, EncodersHaveTheNoiseAskedFor)
 {
   PumaParams params;
   params.encoder_noise = 0.002;
@@ -783,7 +783,7 @@ TEST(PumaTest, encodersHaveTheNoiseAskedFor)
   EXPECT_EQ(exact.measuredJoints(), FORWARD);
 }
 
-TEST(PumaTest, listsAllFaultsOfParameters)
+TEST(PumaTest, ListsAllFaultsOfParameters)
 {
   EXPECT_TRUE(PumaParams().validate().empty());
   PumaParams params;
@@ -804,7 +804,7 @@ TEST(PumaTest, listsAllFaultsOfParameters)
   }
 }
 
-TEST(PumaTest, namesWhatAUrdfLacks)
+TEST(PumaTest, NamesWhatAUrdfLacks)
 {
   EXPECT_EQ(thrown(urdf()), "");
   for (const char* garbage : { "", "garbage", "<robot", "<html></html>", "<robot name=\"r\"/>" })
@@ -844,7 +844,7 @@ TEST(PumaTest, namesWhatAUrdfLacks)
       "joint7 is not revolute");
 }
 
-TEST(PumaTest, refusesEveryBeginningOfAUrdf)
+TEST(PumaTest, RefusesEveryBeginningOfAUrdf)
 {
   const std::string whole = urdf();
   for (std::size_t length = 0; length + 10 < whole.size(); length += 97)

@@ -83,21 +83,5 @@ inline cv::Mat disturbed(const cv::Mat& picture, double gain, double offset, dou
   return result;
 }
 
-/** Mean distance of where two homographies send the corners of an image [px]; NaN for a NaN matrix. */
-inline double cornerError(const Eigen::Matrix3d& estimated, const Eigen::Matrix3d& truth, const cv::Size& size)
-{
-  double sum = 0.0;
-  for (const double u : { 0.0, size.width - 1.0 })
-  {
-    for (const double v : { 0.0, size.height - 1.0 })
-    {
-      const Eigen::Vector3d a = estimated * Eigen::Vector3d(u, v, 1.0);
-      const Eigen::Vector3d b = truth * Eigen::Vector3d(u, v, 1.0);
-      sum += (a.head<2>() / a.z() - b.head<2>() / b.z()).norm();
-    }
-  }
-  return sum / 4.0;
-}
-
 }  // namespace test
 }  // namespace view_servo

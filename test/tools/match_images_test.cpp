@@ -172,7 +172,7 @@ double cornerError(const json& result, const cv::Size& size = cv::Size(480, 360)
 
 }  // namespace
 
-TEST_F(MatchImages, findsAHomography)
+TEST_F(MatchImages, FindsAHomography)
 {
   const Outcome outcome = match(reference_, current_);
   EXPECT_EQ(outcome.status, 0);
@@ -181,7 +181,7 @@ TEST_F(MatchImages, findsAHomography)
   EXPECT_LT(cornerError(matchJson(reference_, current_, 0)), 1.0);
 }
 
-TEST_F(MatchImages, jsonHasEveryField)
+TEST_F(MatchImages, JsonHasEveryField)
 {
   const json result = matchJson(reference_, current_, 0);
   EXPECT_EQ(result.at("success"), true);
@@ -221,7 +221,7 @@ TEST_F(MatchImages, jsonHasEveryField)
   EXPECT_GT(close_inliers, 0.95 * inliers);
 }
 
-TEST_F(MatchImages, givesTheSameBytesAgain)
+TEST_F(MatchImages, GivesTheSameBytesAgain)
 {
   json first = matchJson(reference_, current_, 0);
   json second = matchJson(reference_, current_, 0);
@@ -234,7 +234,7 @@ TEST_F(MatchImages, givesTheSameBytesAgain)
   EXPECT_EQ(first.dump(), one_thread.dump());
 }
 
-TEST_F(MatchImages, findsAFundamentalMatrix)
+TEST_F(MatchImages, FindsAFundamentalMatrix)
 {
   // Two planes at different depths: the lower half moves twice as far as the upper one.
   const cv::Mat scene = texture(1);
@@ -255,7 +255,7 @@ TEST_F(MatchImages, findsAFundamentalMatrix)
   EXPECT_NEAR(squares, 1.0, 1e-9);
 }
 
-TEST_F(MatchImages, comparesWithTheTruth)
+TEST_F(MatchImages, ComparesWithTheTruth)
 {
   cv::FileStorage storage(path("truth.xml"), cv::FileStorage::WRITE);
   storage << "H" << cv::Mat(TRUE_HOMOGRAPHY);
@@ -275,7 +275,7 @@ TEST_F(MatchImages, comparesWithTheTruth)
   expectBadInput(match(reference_, current_, { "--truth", path("truth.txt"), "--model", "fundamental" }), "--truth");
 }
 
-TEST_F(MatchImages, writesAnOverlay)
+TEST_F(MatchImages, WritesAnOverlay)
 {
   const Outcome outcome = match(reference_, current_, { "--overlay", path("overlay.png") });
   EXPECT_EQ(outcome.status, 0);
@@ -289,7 +289,7 @@ TEST_F(MatchImages, writesAnOverlay)
   expectBadInput(match(reference_, current_, { "--overlay", path("overlay") }), path("overlay"));
 }
 
-TEST_F(MatchImages, takesParameters)
+TEST_F(MatchImages, TakesParameters)
 {
   const json few = matchJson(reference_, current_, 0, { "--set", "max_corners=100", "--set", "guided=false" });
   EXPECT_LE(few.at("matches").size(), 100U);
@@ -298,14 +298,14 @@ TEST_F(MatchImages, takesParameters)
   EXPECT_EQ(run({ "points", "--set", "max_corners=100", "--json", reference_, current_ }).status, 0);
 }
 
-TEST_F(MatchImages, listsParameters)
+TEST_F(MatchImages, ListsParameters)
 {
   const Outcome outcome = run({ "--list-parameters" });
   EXPECT_EQ(outcome.status, 0);
   EXPECT_NE(outcome.out.find("max_corners (int, default 500, [1, 5000]): "), std::string::npos) << outcome.out;
 }
 
-TEST_F(MatchImages, refusesUnknownParametersAndValues)
+TEST_F(MatchImages, RefusesUnknownParametersAndValues)
 {
   expectBadInput(match(reference_, current_, { "--set", "max_cornerz=100" }), "max_cornerz");
   expectBadInput(match(reference_, current_, { "--set", "max_corners=many" }), "max_corners");
@@ -315,7 +315,7 @@ TEST_F(MatchImages, refusesUnknownParametersAndValues)
   expectBadInput(match(reference_, current_, { "--set", "max_corners" }), "max_corners");
 }
 
-TEST_F(MatchImages, refusesUnknownOptions)
+TEST_F(MatchImages, RefusesUnknownOptions)
 {
   expectBadInput(run({}), "points");
   expectBadInput(run({ "circles", reference_, current_ }), "circles");
@@ -328,7 +328,7 @@ TEST_F(MatchImages, refusesUnknownOptions)
   expectBadInput(match(reference_, current_, { "--overlay" }), "--overlay");
 }
 
-TEST_F(MatchImages, helps)
+TEST_F(MatchImages, Helps)
 {
   EXPECT_EQ(run({ "--help" }).status, 0);
   const Outcome outcome = run({ "points", "--help" });
@@ -337,7 +337,7 @@ TEST_F(MatchImages, helps)
   EXPECT_NE(outcome.out.find("--overlay"), std::string::npos);
 }
 
-TEST_F(MatchImages, refusesFilesThatAreNotImages)
+TEST_F(MatchImages, RefusesFilesThatAreNotImages)
 {
   const std::string missing = path("missing.png");
   expectBadInput(match(missing, current_), missing);
@@ -349,7 +349,7 @@ TEST_F(MatchImages, refusesFilesThatAreNotImages)
   expectBadInput(match(reference_, empty), empty);
 }
 
-TEST_F(MatchImages, refusesFilesItMayNotRead)
+TEST_F(MatchImages, RefusesFilesItMayNotRead)
 {
   if (geteuid() == 0)
   {
@@ -359,7 +359,7 @@ TEST_F(MatchImages, refusesFilesItMayNotRead)
   expectBadInput(match(reference_, current_), reference_);
 }
 
-TEST_F(MatchImages, refusesDamagedImages)
+TEST_F(MatchImages, RefusesDamagedImages)
 {
   // The decoders of these write to standard error on their own.
   for (const std::string ending : { ".png", ".jpg", ".pgm", ".bmp", ".tiff" })
@@ -370,14 +370,14 @@ TEST_F(MatchImages, refusesDamagedImages)
   }
 }
 
-TEST_F(MatchImages, refusesTinyImages)
+TEST_F(MatchImages, RefusesTinyImages)
 {
   const std::string tiny = write("tiny.png", cv::Mat(1, 1, CV_8UC1, cv::Scalar(7)));
   expectBadInput(match(reference_, tiny), tiny);
   expectBadInput(match(tiny, reference_), tiny);
 }
 
-TEST_F(MatchImages, refusesHugeImages)
+TEST_F(MatchImages, RefusesHugeImages)
 {
   const std::string huge = writeText("huge.pgm", "P5 8000 8000 255\n");
   expectBadInput(match(huge, current_), huge);
@@ -385,7 +385,7 @@ TEST_F(MatchImages, refusesHugeImages)
   expectBadInput(match(reference_, header), header);
 }
 
-TEST_F(MatchImages, findsNothingInConstantImages)
+TEST_F(MatchImages, FindsNothingInConstantImages)
 {
   const std::string constant = write("constant.png", cv::Mat(360, 480, CV_8UC1, cv::Scalar(90)));
   for (const json& result :
@@ -399,7 +399,7 @@ TEST_F(MatchImages, findsNothingInConstantImages)
   }
 }
 
-TEST_F(MatchImages, findsNothingInUnrelatedImages)
+TEST_F(MatchImages, FindsNothingInUnrelatedImages)
 {
   for (const std::string model : { "homography", "fundamental" })
   {
@@ -415,7 +415,7 @@ TEST_F(MatchImages, findsNothingInUnrelatedImages)
   EXPECT_FALSE(cv::imread(path("overlay.png")).empty()) << "a picture says why";
 }
 
-TEST_F(MatchImages, findsNothingInAMirror)
+TEST_F(MatchImages, FindsNothingInAMirror)
 {
   cv::Mat mirrored;
   cv::flip(texture(1), mirrored, 1);
@@ -424,7 +424,7 @@ TEST_F(MatchImages, findsNothingInAMirror)
   EXPECT_EQ(match(reference_, mirror, { "--model", "fundamental" }).status, 1);
 }
 
-TEST_F(MatchImages, acceptsColourDepthAndTransparency)
+TEST_F(MatchImages, AcceptsColourDepthAndTransparency)
 {
   const cv::Mat grey = texture(1);
   cv::Mat colour;
@@ -442,7 +442,7 @@ TEST_F(MatchImages, acceptsColourDepthAndTransparency)
   }
 }
 
-TEST_F(MatchImages, acceptsImagesOfTwoSizes)
+TEST_F(MatchImages, AcceptsImagesOfTwoSizes)
 {
   const json result = matchJson(reference_, write("wide.png", warped(texture(1), { 640, 300 })), 0);
   EXPECT_LT(cornerError(result), 1.5);
@@ -542,7 +542,7 @@ bool isEitherWay(const json& reported, const json& written)
 
 }  // namespace
 
-TEST_F(MatchLines, findsAPlane)
+TEST_F(MatchLines, FindsAPlane)
 {
   const Outcome outcome = matchLines();
   EXPECT_EQ(outcome.status, 0) << outcome.out;
@@ -552,7 +552,7 @@ TEST_F(MatchLines, findsAPlane)
   EXPECT_LT(view_servo::test::cornerError(matrixOf(pairs.at("matrix")), exampleHomography(), { 480, 360 }), 2.0);
 }
 
-TEST_F(MatchLines, jsonHasEveryField)
+TEST_F(MatchLines, JsonHasEveryField)
 {
   const json result = linesJson(0);
   EXPECT_EQ(result.at("success"), true);
@@ -606,7 +606,7 @@ TEST_F(MatchLines, jsonHasEveryField)
   }
 }
 
-TEST_F(MatchLines, givesTheSameBytesAgain)
+TEST_F(MatchLines, GivesTheSameBytesAgain)
 {
   json first = linesJson(0);
   json one_thread = linesJson(0, { "--threads", "1" });
@@ -615,7 +615,7 @@ TEST_F(MatchLines, givesTheSameBytesAgain)
   EXPECT_EQ(first.dump(), one_thread.dump());
 }
 
-TEST_F(MatchLines, listsLinesWhenTheyLeaveTheModelOpen)
+TEST_F(MatchLines, ListsLinesWhenTheyLeaveTheModelOpen)
 {
   const json result = linesJson(1, { "--model", "fundamental" });
   EXPECT_EQ(result.at("success"), false);
@@ -625,7 +625,7 @@ TEST_F(MatchLines, listsLinesWhenTheyLeaveTheModelOpen)
   EXPECT_FALSE(result.at("message").get<std::string>().empty());
 }
 
-TEST_F(MatchLines, takesSegmentsFromFiles)
+TEST_F(MatchLines, TakesSegmentsFromFiles)
 {
   // What was detected and matched, in an order of our own and every other one turned round.
   std::vector<json> reference;
@@ -664,7 +664,7 @@ TEST_F(MatchLines, takesSegmentsFromFiles)
   }
 }
 
-TEST_F(MatchLines, countsSegmentsNotLinesOfTheFile)
+TEST_F(MatchLines, CountsSegmentsNotLinesOfTheFile)
 {
   std::vector<json> reference;
   std::ostringstream text;
@@ -684,7 +684,7 @@ TEST_F(MatchLines, countsSegmentsNotLinesOfTheFile)
   }
 }
 
-TEST_F(MatchLines, namesFaultsInSegmentFiles)
+TEST_F(MatchLines, NamesFaultsInSegmentFiles)
 {
   const std::string missing = path("none.txt");
   for (const std::string option : { "--segments-ref", "--segments-cur" })
@@ -701,7 +701,7 @@ TEST_F(MatchLines, namesFaultsInSegmentFiles)
   }
 }
 
-TEST_F(MatchLines, findsNothingWithFewSegments)
+TEST_F(MatchLines, FindsNothingWithFewSegments)
 {
   for (const std::string text : { "", "# none\n", "100 100 200 150\n", "-900 -900 -800 -800\n" })
   {
@@ -720,14 +720,14 @@ TEST_F(MatchLines, findsNothingWithFewSegments)
   }
 }
 
-TEST_F(MatchLines, answersForManyRandomSegments)
+TEST_F(MatchLines, AnswersForManyRandomSegments)
 {
   const json result =
       linesJson(1, { "--segments-ref", randomSegments("many.txt", 5000), "--segments-cur", path("many.txt") });
   EXPECT_EQ(result.at("success"), false);
 }
 
-TEST_F(MatchLines, survivesSegmentsFarOutside)
+TEST_F(MatchLines, SurvivesSegmentsFarOutside)
 {
   std::string text;
   for (int i = 0; i < 40; ++i)
@@ -740,7 +740,7 @@ TEST_F(MatchLines, survivesSegmentsFarOutside)
   EXPECT_EQ(matchLines({ "--segments-cur", file }).status, 1);
 }
 
-TEST_F(MatchLines, writesAnOverlay)
+TEST_F(MatchLines, WritesAnOverlay)
 {
   const Outcome outcome = matchLines({ "--overlay", path("overlay.png") });
   EXPECT_EQ(outcome.status, 0);
@@ -751,7 +751,7 @@ TEST_F(MatchLines, writesAnOverlay)
   expectBadInput(matchLines({ "--overlay", path("none/overlay.png") }), path("none/overlay.png"));
 }
 
-TEST_F(MatchLines, comparesWithTheTruth)
+TEST_F(MatchLines, ComparesWithTheTruth)
 {
   writeText("truth.txt", "0.87 -0.12 50\n0.09 0.93 -5\n-2e-4 1e-4 1\n");
   const json result = linesJson(0, { "--truth", path("truth.txt") });
@@ -759,7 +759,7 @@ TEST_F(MatchLines, comparesWithTheTruth)
               view_servo::test::cornerError(matrixOf(result.at("matrix")), exampleHomography(), { 480, 360 }), 1e-6);
 }
 
-TEST_F(MatchLines, takesParameters)
+TEST_F(MatchLines, TakesParameters)
 {
   const json few = linesJson(0, { "--set", "max_segments=150", "segment_min_length=20" });
   for (const json& line : few.at("matches"))
@@ -777,7 +777,7 @@ TEST_F(MatchLines, takesParameters)
   expectBadInput(matchLines({ "--set", "min_plane_lines=1" }), "min_plane_lines");
 }
 
-TEST_F(MatchLines, refusesUnknownOptions)
+TEST_F(MatchLines, RefusesUnknownOptions)
 {
   expectBadInput(run({ "lines" }), "REF");
   expectBadInput(matchLines({ "--groups", "quartets" }), "--groups");
@@ -787,14 +787,14 @@ TEST_F(MatchLines, refusesUnknownOptions)
   EXPECT_NE(run({ "lines", "--help" }).out.find("--segments-cur"), std::string::npos);
 }
 
-TEST_F(MatchLines, refusesFilesThatAreNotImages)
+TEST_F(MatchLines, RefusesFilesThatAreNotImages)
 {
   const std::string text = writeText("text.png", "not an image\n");
   expectBadInput(run({ "lines", reference_, text }), text);
   expectBadInput(run({ "lines", text, current_ }), text);
 }
 
-TEST_F(MatchLines, findsNothingInUnrelatedOrConstantImages)
+TEST_F(MatchLines, FindsNothingInUnrelatedOrConstantImages)
 {
   const std::string constant = write("constant.png", cv::Mat(360, 480, CV_8UC1, cv::Scalar(90)));
   const std::string other = write("other.png", texturedPicture(2));

@@ -2,7 +2,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "view_servo/tracking/plane_filter.h"
 
-#include "../support/synthetic_scene.h"
+#include "support/synthetic_scene.h"
 #include "view_servo/geometry/homography.h"
 
 #include <gtest/gtest.h>

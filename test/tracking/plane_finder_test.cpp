@@ -2,6 +2,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "view_servo/tracking/plane_finder.h"
 
+#include "support/corner_error.h"
+
 #include "support/textured_plane.h"
 
 #include "view_servo/geometry/homography.h"

@@ -2,6 +2,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "view_servo/tracking/plane_tracker.h"
 
+#include "support/corner_error.h"
+
 #include "sim/textures.h"
 #include "view_servo/geometry/homography.h"
 #include "view_servo/robust/random.h"
@@ -104,19 +106,6 @@ cv::Mat covered()
   return { HEIGHT, WIDTH, CV_8UC1, cv::Scalar(60) };
 }
 
-double cornerError(const Eigen::Matrix3d& a, const Eigen::Matrix3d& b)
-{
-  double worst = 0.0;
-  for (const double u : { 0.0, WIDTH - 1.0 })
-  {
-    for (const double v : { 0.0, HEIGHT - 1.0 })
-    {
-      worst = std::max(worst, (transfer(a, { u, v }) - transfer(b, { u, v })).norm());
-    }
-  }
-  return worst;
-}
-
 class PlaneTrackerTest : public testing::Test
 {
 protected:
@@ -159,7 +148,7 @@ TEST_F(PlaneTrackerTest, FollowsThePlaneAndLearnsWhereItIs)
     const double time = i / RATE;
     const PlaneTrack& track = tracker.add(scene.image(time), scene.odometry(time));
     ASSERT_EQ(track.state, TrackingState::TRACKING) << time;
-    EXPECT_LT(cornerError(track.homography.h, scene.truth(time)), 0.3) << time;
+    EXPECT_LT(test::largestCornerError(track.homography.h, scene.truth(time), { WIDTH, HEIGHT }), 0.3) << time;
     ASSERT_TRUE(track.plane) << time;
     if (time > 2.0)
     {
@@ -184,7 +173,7 @@ TEST_F(PlaneTrackerTest, DoesWithoutOdometry)
   {
     const PlaneTrack& track = tracker.add(scene.image(i / RATE), std::nullopt);
     ASSERT_EQ(track.state, TrackingState::TRACKING) << i;
-    EXPECT_LT(cornerError(track.homography.h, scene.truth(i / RATE)), 0.3) << i;
+    EXPECT_LT(test::largestCornerError(track.homography.h, scene.truth(i / RATE), { WIDTH, HEIGHT }), 0.3) << i;
     EXPECT_FALSE(track.plane->distance);
   }
 }
@@ -207,7 +196,7 @@ TEST_F(PlaneTrackerTest, JumpsWithOdometry)
   {
     const PlaneTrack& track = tracker.add(scene.image(time), scene.odometry(time));
     ASSERT_EQ(track.state, TrackingState::TRACKING) << time;
-    EXPECT_LT(cornerError(track.homography.h, scene.truth(time)), 0.3) << time;
+    EXPECT_LT(test::largestCornerError(track.homography.h, scene.truth(time), { WIDTH, HEIGHT }), 0.3) << time;
     if (time > 2.05)
     {
       followed_alone += alone.add(scene.image(time), std::nullopt).state == TrackingState::TRACKING ? 1 : 0;
@@ -234,7 +223,7 @@ TEST_F(PlaneTrackerTest, FindsThePlaneAgainWhereOdometrySaysItIs)
     if (!hidden)
     {
       ASSERT_EQ(track.state, TrackingState::TRACKING) << time;
-      EXPECT_LT(cornerError(track.homography.h, scene.truth(time)), 0.3) << time;
+      EXPECT_LT(test::largestCornerError(track.homography.h, scene.truth(time), { WIDTH, HEIGHT }), 0.3) << time;
       continue;
     }
     ++missed;

@@ -2,6 +2,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "tracking/region_refiner.h"
 
+#include "support/corner_error.h"
+
 #include "support/textured_plane.h"
 
 #include <gtest/gtest.h>

@@ -2,6 +2,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "view_servo/views/line_view_matcher.h"
 
+#include "support/corner_error.h"
+
 #include "support/synthetic_scene.h"
 #include "support/textured_plane.h"
 #include "view_servo/geometry/fundamental.h"
@@ -54,17 +56,6 @@ int correct(const ViewMatch& result, const Eigen::Matrix3d& h)
     const auto mapped = transfer(h, line.reference);
     return mapped && compare(*mapped, line.current).distance < 2.0;
   }));
-}
-
-double cornerError(const Eigen::Matrix3d& a, const Eigen::Matrix3d& b)
-{
-  double sum = 0.0;
-  for (const Eigen::Vector2d& corner :
-       { Eigen::Vector2d(0, 0), { SIZE.width - 1, 0 }, { 0, SIZE.height - 1 }, { SIZE.width - 1, SIZE.height - 1 } })
-  {
-    sum += ((a * corner.homogeneous()).hnormalized() - (b * corner.homogeneous()).hnormalized()).norm() / 4.0;
-  }
-  return sum;
 }
 
 /** Two walls that meet in the upright line u = 320 of the reference, each with its texture: a corner of a room. */
@@ -128,7 +119,7 @@ TEST_P(RolledPlane, IsMatched)
   ASSERT_EQ(result.outcome, MatchOutcome::MATCHED) << result.message;
   EXPECT_GE(result.lines.size(), 40U);
   EXPECT_GE(correct(result, h), static_cast<int>(0.9 * static_cast<double>(result.lines.size())));
-  EXPECT_LT(cornerError(result.matrix, h), 3.0);
+  EXPECT_LT(test::cornerError(result.matrix, h, SIZE), 3.0);
   EXPECT_EQ(result.planes.size(), 1U);
   EXPECT_TRUE(result.fundamental.hasNaN()) << "one plane leaves F open";
 }

@@ -79,7 +79,7 @@ cv::Rect around(double x, double y, int radius = 2)
 
 }  // namespace
 
-TEST(Overlay, showsBothImagesWithoutScalingWhenTheyFit)
+TEST(Overlay, ShowsBothImagesWithoutScalingWhenTheyFit)
 {
   const cv::Mat picture = drawOverlay(image(450, 300), image(450, 200), noMatch());
   EXPECT_EQ(picture.type(), CV_8UC3);
@@ -90,7 +90,7 @@ TEST(Overlay, showsBothImagesWithoutScalingWhenTheyFit)
   EXPECT_NE(picture.at<cv::Vec3b>(201, CURRENT_LEFT), cv::Vec3b(100, 100, 100));
 }
 
-TEST(Overlay, keepsAReadableWidth)
+TEST(Overlay, KeepsAReadableWidth)
 {
   for (const int width : { 16, 100, 1000, 4000 })
   {
@@ -100,7 +100,7 @@ TEST(Overlay, keepsAReadableWidth)
   }
 }
 
-TEST(Overlay, joinsInliersOnly)
+TEST(Overlay, JoinsInliersOnly)
 {
   ViewMatch match = noMatch();
   match.matches.push_back({ { { 100.0, 50.0 }, { 300.0, 50.0 } }, 1.0, true });
@@ -116,7 +116,7 @@ TEST(Overlay, joinsInliersOnly)
   EXPECT_EQ(picture.at<cv::Vec3b>(150, 250), cv::Vec3b(100, 100, 100));
 }
 
-TEST(Overlay, coloursTellPlacesApart)
+TEST(Overlay, ColoursTellPlacesApart)
 {
   ViewMatch match = noMatch();
   match.matches.push_back({ { { 20.0, 50.0 }, { 20.0, 50.0 } }, 1.0, true });
@@ -125,7 +125,7 @@ TEST(Overlay, coloursTellPlacesApart)
   EXPECT_GT(cv::norm(picture.at<cv::Vec3b>(50, 20), picture.at<cv::Vec3b>(100, 430)), 100.0);
 }
 
-TEST(Overlay, drawsTheReferencesOutlineInBothImages)
+TEST(Overlay, DrawsTheReferencesOutlineInBothImages)
 {
   const cv::Rect region(50, 40, 100, 80);
   const cv::Mat picture = drawOverlay(image(450, 200, region), image(450, 200), matchOf(shift(30.0, 20.0)));
@@ -136,7 +136,7 @@ TEST(Overlay, drawsTheReferencesOutlineInBothImages)
   EXPECT_EQ(colouredPixels(picture, around(100, 80, 20)), 0);
 }
 
-TEST(Overlay, drawsNoOutlineForFundamentalMatrices)
+TEST(Overlay, DrawsNoOutlineForFundamentalMatrices)
 {
   ViewMatch match = matchOf(Eigen::Matrix3d::Identity());
   match.model = GeometryModel::FUNDAMENTAL;
@@ -144,7 +144,7 @@ TEST(Overlay, drawsNoOutlineForFundamentalMatrices)
   EXPECT_EQ(colouredPixels(picture, { 0, 0, picture.cols, 200 }), 0);
 }
 
-TEST(Overlay, clipsTheOutlineToTheCurrentImage)
+TEST(Overlay, ClipsTheOutlineToTheCurrentImage)
 {
   const cv::Mat picture = drawOverlay(image(450, 200), image(450, 150), matchOf(shift(-100.0, 20.0)));
   // Nothing of the current image's outline may reach into the reference or below its own image.
@@ -152,7 +152,7 @@ TEST(Overlay, clipsTheOutlineToTheCurrentImage)
   EXPECT_EQ(colouredPixels(picture, { CURRENT_LEFT, 150, 450, picture.rows - 150 }), 0);
 }
 
-TEST(Overlay, drawsWhatIsInFrontWhenThePlaneReachesTheHorizon)
+TEST(Overlay, DrawsWhatIsInFrontWhenThePlaneReachesTheHorizon)
 {
   Eigen::Matrix3d h = Eigen::Matrix3d::Identity();
   h(2, 0) = -1.0 / 300.0;  // columns from 300 on are behind the camera
@@ -167,7 +167,7 @@ TEST(Overlay, drawsWhatIsInFrontWhenThePlaneReachesTheHorizon)
   EXPECT_EQ(cv::norm(picture, same, cv::NORM_INF), 0.0) << "a homography has no sign";
 }
 
-TEST(Overlay, saysWhatHappened)
+TEST(Overlay, SaysWhatHappened)
 {
   const auto caption = [](const cv::Mat& picture) {
     return picture.rowRange(200, picture.rows).clone();
@@ -182,7 +182,7 @@ TEST(Overlay, saysWhatHappened)
       << "it fits";
 }
 
-TEST(Overlay, drawsBothSegmentsOfAPairInOneColour)
+TEST(Overlay, DrawsBothSegmentsOfAPairInOneColour)
 {
   ViewMatch match = noMatch();
   match.lines.push_back(line({ { 50.0, 50.0 }, { 150.0, 50.0 } }, { { 300.0, 60.0 }, { 300.0, 160.0 } }));
@@ -197,7 +197,7 @@ TEST(Overlay, drawsBothSegmentsOfAPairInOneColour)
   EXPECT_GT(cv::norm(colour(70, 50), colour(70, 150)), 100.0);
 }
 
-TEST(Overlay, dimsTheImagesUnderSegmentsOnly)
+TEST(Overlay, DimsTheImagesUnderSegmentsOnly)
 {
   ViewMatch match = noMatch();
   match.lines.push_back(line({ { 50.0, 50.0 }, { 150.0, 50.0 } }, { { 300.0, 60.0 }, { 300.0, 160.0 } }));
@@ -206,7 +206,7 @@ TEST(Overlay, dimsTheImagesUnderSegmentsOnly)
   EXPECT_LT(picture.at<cv::Vec3b>(150, CURRENT_LEFT + 50)[0], 90);
 }
 
-TEST(Overlay, numbersSegmentsUnlessTheyAreMany)
+TEST(Overlay, NumbersSegmentsUnlessTheyAreMany)
 {
   // The same picture but for what stands beside one segment.
   const auto pixels_beside = [](std::size_t count) {
@@ -220,7 +220,7 @@ TEST(Overlay, numbersSegmentsUnlessTheyAreMany)
   EXPECT_EQ(pixels_beside(61), 0);
 }
 
-TEST(Overlay, tellsPlanesApart)
+TEST(Overlay, TellsPlanesApart)
 {
   const auto drawn = [](int plane) {
     ViewMatch match = noMatch();
@@ -236,7 +236,7 @@ TEST(Overlay, tellsPlanesApart)
   EXPECT_GT(cv::norm(second, third, cv::NORM_INF), 50.0);
 }
 
-TEST(Overlay, marksIntersections)
+TEST(Overlay, MarksIntersections)
 {
   ViewMatch match = noMatch();
   match.lines.push_back(line({ { 50.0, 50.0 }, { 150.0, 50.0 } }, { { 300.0, 60.0 }, { 300.0, 160.0 } }));
@@ -247,7 +247,7 @@ TEST(Overlay, marksIntersections)
   EXPECT_EQ(colouredPixels(picture, around(400, 110)), 0) << "they are not joined";
 }
 
-TEST(Overlay, clipsSegmentsToTheirImages)
+TEST(Overlay, ClipsSegmentsToTheirImages)
 {
   ViewMatch match = noMatch();
   match.lines.push_back(line({ { 400.0, 50.0 }, { 1e6, 50.0 } }, { { -1e6, 100.0 }, { 50.0, 100.0 } }));
@@ -260,7 +260,7 @@ TEST(Overlay, clipsSegmentsToTheirImages)
   EXPECT_EQ(colouredPixels(picture, { 0, 80, 450, picture.rows - 80 }), 0);
 }
 
-TEST(Overlay, drawsTheOutlineWhenLinesHaveOnePlane)
+TEST(Overlay, DrawsTheOutlineWhenLinesHaveOnePlane)
 {
   const cv::Rect region(50, 40, 100, 80);
   ViewMatch match = matchOf(shift(30.0, 20.0));

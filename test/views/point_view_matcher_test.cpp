@@ -2,6 +2,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "view_servo/views/point_view_matcher.h"
 
+#include "support/corner_error.h"
+
 #include "view_servo/geometry/fundamental.h"
 
 #include "support/textured_plane.h"
@@ -24,11 +26,11 @@ using view_servo::GeometryEstimator;
 using view_servo::GeometryModel;
 using view_servo::MatchedPoint;
 using view_servo::MatchOutcome;
+using view_servo::PointViewMatcher;
+using view_servo::PointViewMatcherParams;
 using view_servo::PreparedImage;
 using view_servo::ViewConsistency;
 using view_servo::ViewMatch;
-using view_servo::PointViewMatcher;
-using view_servo::PointViewMatcherParams;
 using view_servo::test::blotchedPicture;
 using view_servo::test::cornerError;
 using view_servo::test::disturbed;
@@ -50,7 +52,7 @@ ViewMatch matchImages(const PointViewMatcherParams& params, const cv::Mat& refer
                       GeometryModel model = GeometryModel::HOMOGRAPHY, const cv::Rect& region = cv::Rect())
 {
   return PointViewMatcher(params).match(PreparedImage(reference, region, params.points),
-                                   PreparedImage(current, cv::Rect(), params.points), model);
+                                        PreparedImage(current, cv::Rect(), params.points), model);
 }
 
 /** Two planes meeting in the middle of the reference like the pages of an open book, seen by two cameras. */

@@ -70,7 +70,7 @@ private:
 
 }  // namespace
 
-TEST_F(SegmentIo, readsFourNumbersALine)
+TEST_F(SegmentIo, ReadsFourNumbersALine)
 {
   const Segments segments = read("1 2 3 4\n  -5.5\t6e1   7 \t8.25\t \n9 10 11 12");
   ASSERT_EQ(segments.size(), 3U);
@@ -81,14 +81,14 @@ TEST_F(SegmentIo, readsFourNumbersALine)
   EXPECT_EQ(segments[2].end, Eigen::Vector2d(11.0, 12.0));
 }
 
-TEST_F(SegmentIo, skipsBlankLinesAndRemarks)
+TEST_F(SegmentIo, SkipsBlankLinesAndRemarks)
 {
   EXPECT_EQ(read("# x1 y1 x2 y2\n\n1 2 3 4\n \t\n  # and so on\r\n5 6 7 8\r\n\n").size(), 2U);
   EXPECT_TRUE(read("").empty());
   EXPECT_TRUE(read("\n\n#\n").empty());
 }
 
-TEST_F(SegmentIo, namesTheLineOfEachFault)
+TEST_F(SegmentIo, NamesTheLineOfEachFault)
 {
   for (const std::string bad : { "1 2 3",        "1 2 3 4 5",     "7",          "1 2 3 x",          "1 2 3 4x",
                                  "1,2,3,4",      "1,5 2 3 4",     "0x10 2 3 4", "1 2 - 4",          "nan 2 3 4",
@@ -101,18 +101,18 @@ TEST_F(SegmentIo, namesTheLineOfEachFault)
   expectFault(std::string("1 2 3 4\n1 2 3 4\0 5\n", 17), 2);
 }
 
-TEST_F(SegmentIo, acceptsTheLargestCoordinates)
+TEST_F(SegmentIo, AcceptsTheLargestCoordinates)
 {
   EXPECT_EQ(read("-1e6 -1e6 1e6 1e6\n").size(), 1U);
 }
 
-TEST_F(SegmentIo, refusesLongLinesAtOnce)
+TEST_F(SegmentIo, RefusesLongLinesAtOnce)
 {
   expectFault("1 2 3 4\n" + std::string(5'000'000, '1'), 2);
   expectFault("1 2 3 4" + std::string(5'000'000, ' ') + "\n", 1);
 }
 
-TEST_F(SegmentIo, refusesTooManySegments)
+TEST_F(SegmentIo, RefusesTooManySegments)
 {
   std::string text;
   for (std::size_t i = 0; i < MAX_FILE_SEGMENTS; ++i)
@@ -123,7 +123,7 @@ TEST_F(SegmentIo, refusesTooManySegments)
   expectFault(text + "1 2 3 4\n", static_cast<int>(MAX_FILE_SEGMENTS) + 1);
 }
 
-TEST_F(SegmentIo, refusesWhatIsNoFile)
+TEST_F(SegmentIo, RefusesWhatIsNoFile)
 {
   EXPECT_NE(errorOf(path("none.txt")), "no error");
   EXPECT_NE(errorOf(path(".")).find("not a file"), std::string::npos);
@@ -131,7 +131,7 @@ TEST_F(SegmentIo, refusesWhatIsNoFile)
   EXPECT_NE(errorOf(""), "no error");
 }
 
-TEST_F(SegmentIo, refusesFilesItMayNotRead)
+TEST_F(SegmentIo, RefusesFilesItMayNotRead)
 {
   if (geteuid() == 0)
   {
@@ -142,7 +142,7 @@ TEST_F(SegmentIo, refusesFilesItMayNotRead)
   EXPECT_NE(errorOf(file), "no error");
 }
 
-TEST_F(SegmentIo, doesNotDependOnTheLocale)
+TEST_F(SegmentIo, DoesNotDependOnTheLocale)
 {
   const std::locale old;
   class Commas : public std::numpunct<char>

@@ -194,7 +194,7 @@ protected:
 
 }  // namespace
 
-TEST(ViewName, isAFileNameThatNeedsNoEscaping)
+TEST(ViewName, IsAFileNameThatNeedsNoEscaping)
 {
   EXPECT_TRUE(isValidViewName("a"));
   EXPECT_TRUE(isValidViewName("7"));
@@ -209,7 +209,7 @@ TEST(ViewName, isAFileNameThatNeedsNoEscaping)
   }
 }
 
-TEST_F(ViewStoreTest, returnsWhatWasSaved)
+TEST_F(ViewStoreTest, ReturnsWhatWasSaved)
 {
   store_.save(fullView("full"), false);
   store_.save(plainView("plain"), false);
@@ -217,7 +217,7 @@ TEST_F(ViewStoreTest, returnsWhatWasSaved)
   expectSame(store_.load("plain"), plainView("plain"));
 }
 
-TEST_F(ViewStoreTest, returnsOtherCombinationsOfFields)
+TEST_F(ViewStoreTest, ReturnsOtherCombinationsOfFields)
 {
   StoredView without_pose = fullView("a");
   without_pose.pose.reset();
@@ -234,13 +234,13 @@ TEST_F(ViewStoreTest, returnsOtherCombinationsOfFields)
   }
 }
 
-TEST_F(ViewStoreTest, survivesItsOwnEnd)
+TEST_F(ViewStoreTest, SurvivesItsOwnEnd)
 {
   store_.save(fullView("desk"), false);
   expectSame(ViewStore(store_.directory()).load("desk"), fullView("desk"));
 }
 
-TEST_F(ViewStoreTest, isEmptyWithoutADirectory)
+TEST_F(ViewStoreTest, IsEmptyWithoutADirectory)
 {
   EXPECT_TRUE(store_.list().names.empty());
   EXPECT_TRUE(store_.list().damaged.empty());
@@ -249,7 +249,7 @@ TEST_F(ViewStoreTest, isEmptyWithoutADirectory)
   EXPECT_ERROR(store_.remove("desk"), "cannot remove view 'desk': there is none of that name");
 }
 
-TEST_F(ViewStoreTest, overwritesOnlyWhenAllowed)
+TEST_F(ViewStoreTest, OverwritesOnlyWhenAllowed)
 {
   store_.save(plainView("desk", 1), false);
   EXPECT_ERROR(store_.save(plainView("desk", 2), false),
@@ -260,7 +260,7 @@ TEST_F(ViewStoreTest, overwritesOnlyWhenAllowed)
   EXPECT_EQ(filesIn(store_.directory()).size(), 2U);
 }
 
-TEST_F(ViewStoreTest, keepsAnImageThatIsSavedAgain)
+TEST_F(ViewStoreTest, KeepsAnImageThatIsSavedAgain)
 {
   store_.save(plainView("desk"), false);
   StoredView view = plainView("desk");
@@ -269,7 +269,7 @@ TEST_F(ViewStoreTest, keepsAnImageThatIsSavedAgain)
   expectSame(store_.load("desk"), view);
 }
 
-TEST_F(ViewStoreTest, revisionChangesWithTheView)
+TEST_F(ViewStoreTest, RevisionChangesWithTheView)
 {
   store_.save(plainView("desk", 1), false);
   const std::string first = store_.revision("desk");
@@ -278,7 +278,7 @@ TEST_F(ViewStoreTest, revisionChangesWithTheView)
   EXPECT_NE(store_.revision("desk"), first);
 }
 
-TEST_F(ViewStoreTest, listsSorted)
+TEST_F(ViewStoreTest, ListsSorted)
 {
   for (const std::string name : { "window", "Desk", "10", "door-2" })
   {
@@ -287,7 +287,7 @@ TEST_F(ViewStoreTest, listsSorted)
   EXPECT_EQ(store_.list().names, (std::vector<std::string>{ "10", "Desk", "door-2", "window" }));
 }
 
-TEST_F(ViewStoreTest, removesOneViewOnly)
+TEST_F(ViewStoreTest, RemovesOneViewOnly)
 {
   store_.save(plainView("desk"), false);
   store_.save(plainView("desk-2"), false);
@@ -297,7 +297,7 @@ TEST_F(ViewStoreTest, removesOneViewOnly)
   EXPECT_EQ(filesIn(store_.directory()).size(), 2U);
 }
 
-TEST_F(ViewStoreTest, refusesNamesThatAreNotFileNames)
+TEST_F(ViewStoreTest, RefusesNamesThatAreNotFileNames)
 {
   writeBytes(directory_.path() / "outside.yaml", "untouched");
   for (const std::string& name : { std::string("../outside"), std::string("a/b"), std::string(), std::string(65, 'x') })
@@ -312,7 +312,7 @@ TEST_F(ViewStoreTest, refusesNamesThatAreNotFileNames)
   EXPECT_FALSE(fs::exists(store_.directory()));
 }
 
-TEST_F(ViewStoreTest, refusesViewsItCouldNotReturn)
+TEST_F(ViewStoreTest, RefusesViewsItCouldNotReturn)
 {
   StoredView view = plainView("desk");
   view.image = cv::Mat();
@@ -343,7 +343,7 @@ TEST_F(ViewStoreTest, refusesViewsItCouldNotReturn)
   EXPECT_TRUE(store_.list().names.empty());
 }
 
-TEST_F(ViewStoreTest, saysWhenItsDirectoryIsNoDirectory)
+TEST_F(ViewStoreTest, SaysWhenItsDirectoryIsNoDirectory)
 {
   writeBytes(store_.directory(), "a file");
   EXPECT_ERROR(store_.save(plainView("desk"), false), "cannot save view 'desk': ");
@@ -351,7 +351,7 @@ TEST_F(ViewStoreTest, saysWhenItsDirectoryIsNoDirectory)
   EXPECT_ERROR(store_.list(), "cannot list views: ");
 }
 
-TEST_F(ViewStoreTest, saysWhenItsDirectoryIsNotWritable)
+TEST_F(ViewStoreTest, SaysWhenItsDirectoryIsNotWritable)
 {
   store_.save(plainView("desk", 1), false);
   // Not even root can write here.
@@ -368,7 +368,7 @@ TEST_F(ViewStoreTest, saysWhenItsDirectoryIsNotWritable)
   fs::permissions(store_.directory(), fs::perms::owner_all);
 }
 
-TEST_F(DamagedViewTest, changedYaml)
+TEST_F(DamagedViewTest, ChangedYaml)
 {
   const std::string text = readBytes(file("bad.", ".yaml"));
   for (std::size_t i = 0; i < text.size(); i += 7)
@@ -382,7 +382,7 @@ TEST_F(DamagedViewTest, changedYaml)
   expectOnlyBadDamaged("checksum");
 }
 
-TEST_F(DamagedViewTest, truncatedYaml)
+TEST_F(DamagedViewTest, TruncatedYaml)
 {
   const std::string text = readBytes(file("bad.", ".yaml"));
   for (const std::size_t length : { std::size_t(0), std::size_t(1), text.size() / 2, text.size() - 1 })
@@ -392,7 +392,7 @@ TEST_F(DamagedViewTest, truncatedYaml)
   }
 }
 
-TEST_F(DamagedViewTest, somethingElseInTheYaml)
+TEST_F(DamagedViewTest, SomethingElseInTheYaml)
 {
   for (const std::string text : { "\x01\xFF\n", "[", "hello", "a: {", "checksum: cbf29ce484222325\n" })
   {
@@ -401,14 +401,14 @@ TEST_F(DamagedViewTest, somethingElseInTheYaml)
   }
 }
 
-TEST_F(DamagedViewTest, truncatedImage)
+TEST_F(DamagedViewTest, TruncatedImage)
 {
   const fs::path image = file("bad.", ".png");
   fs::resize_file(image, fs::file_size(image) - 10);
   expectOnlyBadDamaged("does not agree with the checksum");
 }
 
-TEST_F(DamagedViewTest, changedImage)
+TEST_F(DamagedViewTest, ChangedImage)
 {
   std::string bytes = readBytes(file("bad.", ".png"));
   bytes[bytes.size() / 2] = static_cast<char>(bytes[bytes.size() / 2] ^ 0x10);
@@ -416,19 +416,19 @@ TEST_F(DamagedViewTest, changedImage)
   expectOnlyBadDamaged("does not agree with the checksum");
 }
 
-TEST_F(DamagedViewTest, anotherViewsImage)
+TEST_F(DamagedViewTest, AnotherViewsImage)
 {
   fs::copy_file(file("good.", ".png"), file("bad.", ".png"), fs::copy_options::overwrite_existing);
   expectOnlyBadDamaged("does not agree with the checksum");
 }
 
-TEST_F(DamagedViewTest, missingImage)
+TEST_F(DamagedViewTest, MissingImage)
 {
   fs::remove(file("bad.", ".png"));
   expectOnlyBadDamaged("is missing");
 }
 
-TEST_F(DamagedViewTest, canBeRemoved)
+TEST_F(DamagedViewTest, CanBeRemoved)
 {
   writeBytes(file("bad.", ".yaml"), "nonsense");
   store_.remove("bad");
@@ -436,7 +436,7 @@ TEST_F(DamagedViewTest, canBeRemoved)
   EXPECT_EQ(filesIn(store_.directory()).size(), 2U);
 }
 
-TEST_F(DamagedViewTest, canBeOverwritten)
+TEST_F(DamagedViewTest, CanBeOverwritten)
 {
   fs::remove(file("bad.", ".png"));
   EXPECT_ERROR(store_.save(plainView("bad"), false), "there is one of that name");
@@ -444,7 +444,7 @@ TEST_F(DamagedViewTest, canBeOverwritten)
   expectSame(store_.load("bad"), plainView("bad"));
 }
 
-TEST_F(ViewStoreTest, ignoresAndClearsWhatACrashLeft)
+TEST_F(ViewStoreTest, IgnoresAndClearsWhatACrashLeft)
 {
   store_.save(plainView("desk", 1), false);
   store_.save(plainView("desk-2", 1), false);
@@ -506,7 +506,7 @@ std::optional<bool> killAtSystemCall(int calls, const Action& action)
 
 }  // namespace
 
-TEST_F(ViewStoreTest, holdsTheOldOrTheNewViewWhereverSavingIsKilled)
+TEST_F(ViewStoreTest, HoldsTheOldOrTheNewViewWhereverSavingIsKilled)
 {
   const StoredView before = plainView("desk", 1);
   StoredView after = fullView("desk");
@@ -535,7 +535,7 @@ TEST_F(ViewStoreTest, holdsTheOldOrTheNewViewWhereverSavingIsKilled)
   EXPECT_GT(seen_after, 5);
 }
 
-TEST_F(ViewStoreTest, readersSeeTheOldOrTheNewViewWhileItIsSaved)
+TEST_F(ViewStoreTest, ReadersSeeTheOldOrTheNewViewWhileItIsSaved)
 {
   // Stamp and image tell the same number, so that a mixture would show.
   const auto numbered = [](int number) {
