@@ -60,7 +60,7 @@ Verdict judge(const Circumstances& circumstances, const Progress& progress)
                                  (circumstances.missing_input.empty() || !prepared ? reasonOf(progress)
                                                                                    : circumstances.missing_input) };
   }
-  if (prepared && !circumstances.heard)
+  if (prepared && !circumstances.has_listener)
   {
     return { Verdict::ABORT, "nobody listens any more to the commands" };
   }

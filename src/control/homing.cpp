@@ -43,7 +43,7 @@ public:
   }
 
 protected:
-  void takeOdometry(const PlanarPose& base_in_odom) override
+  void onOdometry(const PlanarPose& base_in_odom) override
   {
     if (moving_ && compose(inverse(step_start_), base_in_odom).distance() >= step_length_)
     {
@@ -52,7 +52,7 @@ protected:
     }
   }
 
-  void takeMatches(double stamp, const HeadingEvidence& evidence, const PlanarPose& /*camera_in_odom*/) override
+  void onMatches(double stamp, const HeadingEvidence& evidence, const PlanarPose& /*camera_in_odom*/) override
   {
     if (moving_ || ended() || !step_end_known_ || stamp < step_end_ || !(similarity_stamp_ >= step_end_))
     {
@@ -95,7 +95,7 @@ protected:
              arrival == Arrival::NEAR ? "the correlation has risen" : "the heading is known");
   }
 
-  void takeImage(double stamp, const cv::Mat& /*grey*/) override
+  void onImage(double stamp, const cv::Mat& /*grey*/) override
   {
     constexpr double AT_REST = 0.003;  // moved between two images of a base that stands [m]
     if (ended())
@@ -169,7 +169,7 @@ public:
   }
 
 protected:
-  void takeMatches(double stamp, const HeadingEvidence& evidence, const PlanarPose& camera_in_odom) override
+  void onMatches(double stamp, const HeadingEvidence& evidence, const PlanarPose& camera_in_odom) override
   {
     hypotheses_.update(evidence.pairs, camera_in_odom);
     const bool any = !hypotheses_.list().empty();
@@ -217,7 +217,7 @@ protected:
     }
   }
 
-  void takeImage(double stamp, const cv::Mat& grey) override
+  void onImage(double stamp, const cv::Mat& grey) override
   {
     const std::optional<PlanarPose> base = odometry_.at(stamp);
     if (!base || ended())
@@ -523,7 +523,7 @@ void Homing::addMatches(double stamp, const Correspondences& pixels, const std::
       evidence.weights.push_back(weights[i]);
     }
   }
-  takeMatches(stamp, evidence, compose(*base, target_.mount.on_base));
+  onMatches(stamp, evidence, compose(*base, target_.mount.on_base));
 }
 
 void Homing::addImage(double stamp, const cv::Mat& grey)
@@ -534,7 +534,7 @@ void Homing::addImage(double stamp, const cv::Mat& grey)
   }
   report_.stamp = stamp;
   report_.similarity = gradientSimilarity(reference_gradients_, gradientMagnitude(grey));
-  takeImage(stamp, grey);
+  onImage(stamp, grey);
 }
 
 std::unique_ptr<Homing> makeHoming(const HomingParams& params, const HomingTarget& target)

@@ -81,7 +81,7 @@ std::string JointGuard::problem(double time)
   return worst;
 }
 
-void JointGuard::rest()
+void JointGuard::clearStuck()
 {
   stuck_since_.clear();
 }

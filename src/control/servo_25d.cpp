@@ -157,10 +157,10 @@ void Servo25d::add(const PlaneView& view)
     distance_ = view.distance;
   }
   lost_since_.reset();
-  judge(view.stamp);
+  updateReport(view.stamp);
 }
 
-void Servo25d::judge(double stamp)
+void Servo25d::updateReport(double stamp)
 {
   const Servo25dError error = servo25dError(view_->motion, chosen_);
   report_.error = error;

@@ -33,8 +33,8 @@ public:
   }
 
   /**
-   * SegmentAgreement::share of the two, or 0 when they do not agree. @param direction from the other's start to its end, a
-   * unit vector.
+   * SegmentAgreement::share of the two, or 0 when they do not agree. @param direction from the other's start to its
+   * end, a unit vector.
    */
   double agreement(const Segment& other, const Eigen::Vector2d& direction) const
   {
@@ -60,9 +60,9 @@ private:
 };
 
 /**
- * The one-to-one matches that agree with a homography (x_cur ~ H x_ref) among the reference segments `of`, given by their
- * indices, and all current ones: within `tolerance` [px] across, within `max_angle_deg`, and side by side for a third of
- * the shorter. The largest share comes first.
+ * The one-to-one matches that agree with a homography (x_cur ~ H x_ref) among the reference segments `of`, given by
+ * their indices, and all current ones: within `tolerance` [px] across, within `max_angle_deg`, and side by side for a
+ * third of the shorter. The largest share comes first.
  */
 std::vector<SegmentMatch> agreeingSegments(const Segments& reference, const std::vector<int>& of,
                                            const LineFeatures& current, const Eigen::Matrix3d& h, double tolerance,

@@ -154,7 +154,7 @@ public:
     task_ = std::move(task);
     task_->start = Clock::now();
     camera_frame_ = info_->header.frame_id;
-    joints_.rest();
+    joints_.clearStuck();
     joint_states_.setNeeded(joint_states_.fresh());
     onCameraInfo(info_);  // it may have changed since
   }
@@ -195,7 +195,7 @@ public:
     task_->moves = !twist.isZero();
     if (!task_->moves)
     {
-      joints_.rest();
+      joints_.clearStuck();
       return twist;
     }
     task_->failure = joints_.problem(steadySeconds());
@@ -209,7 +209,7 @@ public:
 
   void onMissingInput(double time, const std::string& why)
   {
-    joints_.rest();
+    joints_.clearStuck();
     if (task_->found)
     {
       task_->servo.addLoss(time, why);

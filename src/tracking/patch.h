@@ -12,8 +12,9 @@
 namespace view_servo
 {
 /** @file
- * Squares of grey values about a place of the stored view, (2 radius + 1)² of them row by row, and where they are in another
- * image. A homography h maps the stored view to that image, x_cur ~ h x_ref [px]; both may be one level of their pyramids.
+ * Squares of grey values about a place of the stored view, (2 radius + 1)² of them row by row, and where they are in
+ * another image. A homography h maps the stored view to that image, x_cur ~ h x_ref [px]; both may be one level of
+ * their pyramids.
  */
 
 /** Whether the square, seen through h, lies in an image of a size, with a pixel to spare. */
@@ -25,7 +26,8 @@ void warpSquare(const cv::Mat& current, const Eigen::Matrix3d& h, const Eigen::V
 
 /**
  * Shifts and scales values to zero mean and unit norm, so that gain and offset of the light no longer matter.
- * @return the norm without the mean, before it was made 1; or 0, and nothing changes, when there is hardly any contrast.
+ * @return the norm without the mean, before it was made 1; or 0, and nothing changes, when there is hardly any
+ * contrast.
  */
 float normalize(std::vector<float>& values);
 
@@ -58,7 +60,8 @@ struct PatchAlignment
 };
 
 /**
- * Looks for a usable patch near where h puts it, by the inverse compositional method (Baker & Matthews 2004) for a shift.
+ * Looks for a usable patch near where h puts it, by the inverse compositional method (Baker & Matthews 2004) for a
+ * shift.
  * @param at the patch's middle in its level of the stored view. @param iterations at most, >= 1.
  * @return empty when it leaves the image, loses all contrast or moves by more than 1.5 radii.
  */

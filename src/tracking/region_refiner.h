@@ -15,10 +15,10 @@
 namespace view_servo
 {
 /**
- * Refines a homography that is right to a few pixels by all pixels of a region of the stored view. The region is divided
- * into blocks, each normalised for the light on it. Steps of the inverse compositional method (Baker & Matthews 2004) fit
- * the eight parameters of the homography to all blocks together, and blocks that differ more than the others, as those do
- * that are partly hidden, count less.
+ * Refines a homography that is right to a few pixels by all pixels of a region of the stored view. The region is
+ * divided into blocks, each normalised for the light on it. Steps of the inverse compositional method (Baker & Matthews
+ * 2004) fit the eight parameters of the homography to all blocks together, and blocks that differ more than the others,
+ * as those do that are partly hidden, count less.
  */
 class RegionRefiner
 {
@@ -37,8 +37,8 @@ public:
 
   /**
    * @param current 8-bit, one channel. @param h x_cur ~ H x_ref [px].
-   * @return the refined homography. It is `h` itself when fewer than 12 blocks are seen, or when a step would move a corner
-   * of the region by 10 px or more.
+   * @return the refined homography. It is `h` itself when fewer than 12 blocks are seen, or when a step would move a
+   * corner of the region by 10 px or more.
    */
   Eigen::Matrix3d refine(const cv::Mat& current, const Eigen::Matrix3d& h) const;
 

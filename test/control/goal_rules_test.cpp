@@ -86,11 +86,11 @@ std::vector<Row> table()
     { "preparing, late", [](Circumstances& c) { c.elapsed = 61.0; }, Progress::PREPARING, "no image yet",
       Verdict::ABORT, "not begun within 60 s: no image yet" },
     // What is waited for then is no reason to end.
-    { "preparing, unheard", [](Circumstances& c) { c.heard = false; }, Progress::PREPARING, "no image yet",
+    { "preparing, unheard", [](Circumstances& c) { c.has_listener = false; }, Progress::PREPARING, "no image yet",
       Verdict::STAND, "no image yet" },
     { "preparing, silent", silent(9.0), Progress::PREPARING, "no image yet", Verdict::STAND, "no image yet" },
     // Afterwards it is.
-    { "unheard", [](Circumstances& c) { c.heard = false; }, Progress::DRIVING, "drives", Verdict::ABORT,
+    { "unheard", [](Circumstances& c) { c.has_listener = false; }, Progress::DRIVING, "drives", Verdict::ABORT,
       "nobody listens any more to the commands" },
     { "silent", silent(0.0), Progress::DRIVING, "drives", Verdict::STAND, "no image" },
     { "silent for too long", silent(5.1), Progress::DRIVING, "drives", Verdict::ABORT, "no image" },
@@ -137,14 +137,14 @@ RC_GTEST_PROP(GoalRules, MoveOnlyWhenNothingSpeaksAgainstIt, ())
   c.replaced = *rc::gen::arbitrary<bool>();
   c.enabled = *rc::gen::arbitrary<bool>();
   c.cancelled = *rc::gen::arbitrary<bool>();
-  c.heard = *rc::gen::arbitrary<bool>();
+  c.has_listener = *rc::gen::arbitrary<bool>();
   c.elapsed = *rc::gen::element(1.0, 61.0);
   c.fault = *rc::gen::element<std::string>("", "time went back");
   c.missing_input = *rc::gen::element<std::string>("", "no image");
   c.missing_for = *rc::gen::element(1.0, 6.0);
   const auto state = static_cast<Progress::State>(*rc::gen::inRange<int>(Progress::PREPARING, Progress::FAILED + 1));
   const Verdict verdict = judge(c, { state, *rc::gen::element<std::string>("", "a reason") });
-  const bool may = !c.shutting_down && !c.replaced && c.enabled && !c.cancelled && c.heard && c.elapsed < 60.0 &&
+  const bool may = !c.shutting_down && !c.replaced && c.enabled && !c.cancelled && c.has_listener && c.elapsed < 60.0 &&
                    c.fault.empty() && c.missing_input.empty() && state == Progress::DRIVING;
   RC_ASSERT((verdict.what == Verdict::DRIVE) == may);
   RC_ASSERT(verdict.what != Verdict::SUCCEED || state == Progress::ARRIVED);

@@ -47,7 +47,7 @@ TEST_F(JointGuardTest, LetsAJointComeAway)
   at(0.3, 1.99, 0.0);  // begins to stand anew
   EXPECT_EQ(guard_.problem(0.3), "");
   EXPECT_NE(guard_.problem(0.5), "");
-  guard_.rest();
+  guard_.clearStuck();
   EXPECT_EQ(guard_.problem(0.6), "");
 }
 

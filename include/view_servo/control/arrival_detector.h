@@ -15,8 +15,8 @@ namespace view_servo
 cv::Mat gradientMagnitude(const cv::Mat& grey);
 
 /**
- * Correlation coefficient of two gradient magnitude images, -1..1; NaN when one of them is blank: its
- * gradients vary less than a tenth of the other's.
+ * Correlation coefficient of two images of gradientMagnitude(), in [-1, 1]. NaN when one of them is blank: the standard
+ * deviation of its values is less than a tenth of the other's.
  * @throws std::invalid_argument when their sizes differ.
  */
 double gradientSimilarity(const cv::Mat& reference, const cv::Mat& current);
@@ -24,10 +24,10 @@ double gradientSimilarity(const cv::Mat& reference, const cv::Mat& current);
 /** Options of the arrival detector. */
 struct ArrivalDetectorParams
 {
-  double rise = 1.0;       ///< of a step's rise that is sudden: times the standard deviation of what went before, > 0
-  double min_rise = 0.08;  ///< ... and at least this much, > 0
-  double drop = 0.1;       ///< part of the gain since the approach that is lost again once the view was passed, (0, 1)
-  int min_history = 5;     ///< similarities before any rise counts, >= 2
+  double rise = 1.0;       ///< standard deviations of the similarities before, which a sudden rise exceeds, > 0
+  double min_rise = 0.08;  ///< a sudden rise exceeds this as well, > 0
+  double drop = 0.1;    ///< the view was passed when this part of the gain over the mean before is lost again, (0, 1)
+  int min_history = 5;  ///< similarities that must be known before a rise counts, >= 2
 
   /** All faults, one a line; empty when the parameters are usable. */
   std::vector<std::string> validate() const;
@@ -40,7 +40,7 @@ enum class Arrival
 {
   APPROACHING,
   NEAR,    ///< the similarity has risen suddenly
-  REACHED  ///< ... and has dropped again
+  REACHED  ///< it has dropped again since
 };
 
 /** Decides from the similarity of the current with the stored view, step after step, when to stop (thesis 5.3). */
@@ -51,6 +51,7 @@ public:
   {
   }
 
+  /** The gradientSimilarity() after the next step; one that is not finite changes nothing. @return state(). */
   Arrival add(double similarity);
 
   Arrival state() const

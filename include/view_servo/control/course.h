@@ -10,14 +10,14 @@
 namespace view_servo
 {
 /**
- * What estimation leaves to control: where a base has to go, as a value. It holds until the next image or matches say more,
- * while odometry goes on. Poses are in odometry's frame.
+ * Where a base has to go: what estimation hands to control, as a value. A course stays valid until the next image or
+ * matches give another one, while odometry goes on. Poses are in odometry's frame.
  */
 struct Course
 {
   enum Kind
   {
-    STAND,    ///< it is not known where to
+    STAND,    ///< nothing is known of where to go
     TO_VIEW,  ///< straight to a pose, turning on the way
     STEP      ///< a length in one direction, without turning (chapter 5 of the thesis)
   };
@@ -27,8 +27,8 @@ struct Course
   PlanarPose view;                                             ///< base pose at the view
   double gain = 1.0;                                           ///< speed per distance [1/s]
   double turn_gain = 1.0;                                      ///< turn rate per yaw error [1/s]
-  double min_speed = 0.0;                                      ///< whatever the distance is [m/s]
-  double max_speed = std::numeric_limits<double>::infinity();  ///< likewise
+  double min_speed = 0.0;                                      ///< however near the view is [m/s]
+  double max_speed = std::numeric_limits<double>::infinity();  ///< however far the view is [m/s]
 
   // STEP.
   PlanarPose start;      ///< base pose at its beginning

@@ -15,31 +15,31 @@ struct Progress
 {
   enum State
   {
-    PREPARING,  ///< accepted; what it needs is waited for
-    ACQUIRING,  ///< looks for the view
-    DRIVING,    ///< knows where to go
-    LOST,       ///< knew, and waits to know again
+    PREPARING,  ///< accepted; the driver waits for what the goal needs
+    ACQUIRING,  ///< the driver looks for the view
+    DRIVING,    ///< it knows where to go
+    LOST,       ///< it knew where to go, and waits until it knows again
     ARRIVED,    ///< at the view
-    FAILED      ///< given up
+    FAILED      ///< the driver has given up
   };
   State state = PREPARING;
   std::string reason;  ///< of the state, one line
 };
 
-/** What else decides in a cycle of control. Times are by a steady clock. */
+/** What else is decisive in a cycle of control. Times are by a steady clock. */
 struct Circumstances
 {
   bool shutting_down = false;  ///< the node ends
   bool replaced = false;       ///< another goal has come
   bool enabled = true;
   bool cancelled = false;
-  bool heard = true;     ///< somebody listens to the commands, or nobody needs to
-  double elapsed = 0.0;  ///< since the goal was accepted [s]
-  double timeout = 0.0;  ///< of the goal [s]
-  std::string fault;     ///< why what is known cannot be trusted any more: time went back, an exception; empty: none
-  std::string missing_input;  ///< what does not come, and since when; empty: everything does
-  double missing_for = 0.0;   ///< [s]
-  double patience = 0.0;      ///< after which a goal whose input is missing ends [s]
+  bool has_listener = true;  ///< somebody listens to the commands, or nobody needs to
+  double elapsed = 0.0;      ///< since the goal was accepted [s]
+  double timeout = 0.0;      ///< of the goal [s]
+  std::string fault;  ///< why the driver's state cannot be trusted any more: time went back, an exception; empty: none
+  std::string missing_input;  ///< which input does not come, and since when; empty: all come
+  double missing_for = 0.0;   ///< time since it last came [s]
+  double patience = 0.0;      ///< a goal ends when an input is missing for longer than this [s]
 };
 
 /** What is to be done in a cycle of control. */
@@ -57,9 +57,9 @@ struct Verdict
 };
 
 /**
- * Judges a goal. The first that holds decides: the node ends, another goal has come, what is known cannot be trusted,
- * disabled, cancelled, arrived, given up, timeout, nobody listens, an input is missing. The last two do not matter while the
- * goal is prepared.
+ * Judges a goal. The first of these conditions that holds decides: the node ends, another goal has come, the driver's
+ * state cannot be trusted, it is disabled, the goal is cancelled, the robot has arrived, the driver has given up, the
+ * time is over, nobody listens, an input is missing. The last two do not matter while the goal is prepared.
  */
 Verdict judge(const Circumstances& circumstances, const Progress& progress);
 

@@ -28,10 +28,10 @@ struct HeadingHypothesesParams
   CameraMotion motion = CameraMotion::PLANAR;
   double inlier_threshold = 3.0;  ///< largest error of a match that supports one [px], > 0
   double max_yaw = 0.6;           ///< largest turn between the views that is looked for [rad], (0, pi/2)
-  double min_significance = 6.0;  ///< -log10 of the number of false alarms that one may have at first, >= 0
-  double memory = 0.7;            ///< part of its weight that one keeps from matches to matches, [0, 1)
-  int max_hypotheses = 5;         ///< kept, those with most weight, >= 1
-  double assumed_distance = 1.0;  ///< to the view until it is known [m], > 0
+  double min_significance = 6.0;  ///< of a new one: -log10 of the number of false alarms to be expected, >= 0
+  double memory = 0.7;            ///< part of its weight that one keeps from one set of matches to the next, [0, 1)
+  int max_hypotheses = 5;         ///< those of most weight are kept, >= 1
+  double assumed_distance = 1.0;  ///< distance of the view until it is known [m], > 0
   std::uint64_t seed = 1;
 
   /** All faults, one a line; empty when the parameters are usable. */
@@ -44,18 +44,19 @@ std::vector<Parameter> parameters(HeadingHypothesesParams& params);
 /** A place where the stored view may have been taken. */
 struct HeadingHypothesis
 {
-  PlanarPose view_in_odom;  ///< of its level camera; the direction from the last camera pose is known, the distance not
+  PlanarPose view_in_odom;    ///< of the view's level camera, whose distance from the last camera pose is a guess
   PlanarPose view_in_camera;  ///< as seen from the last camera pose, of distance 1
-  double weight = 0.0;        ///< share of the matches that agree, faded over those before, at most 1 / (1 - memory)
+  double weight = 0.0;        ///< share of the matches that agree, plus memory times the weight before
   int updates = 0;            ///< sets of matches that agreed
   RelativePose motion;        ///< X_cur = R X_ref + t, of which view_in_camera is the part on the floor
   Correspondences support;    ///< last matches that agree
 };
 
 /**
- * Several headings and yaws kept over time (thesis 5.5 asks for it): the motions that each set of matches suggests, found
- * by RANSAC among all and among what the best leaves, confirm hypotheses or add new ones. One that repeated structure
- * suggests now and then fades; the true one gains from all sets.
+ * Keeps several hypotheses of heading and yaw over time, for which thesis 5.5 asks. RANSAC finds one motion among all
+ * matches of a set, and another one among those that disagree with the first; motions that are not known yet become new
+ * hypotheses. Each hypothesis gains weight by the matches of a set that agree with it. One that repeated structure
+ * suggests now and then fades; the true one gains from every set.
  */
 class HeadingHypotheses
 {
@@ -63,7 +64,7 @@ public:
   /** @param focal_length of the level camera [px]. The parameters must be valid. */
   HeadingHypotheses(const HeadingHypothesesParams& params, double focal_length);
 
-  /** Takes matches of an image taken at a pose of the level camera in odometry's frame. */
+  /** @param matches level points of an image. @param camera_in_odom pose of the level camera at its time. */
   void update(const Correspondences& matches, const PlanarPose& camera_in_odom);
 
   /** Most weight first. */
@@ -78,7 +79,7 @@ public:
   }
 
 private:
-  /** The motion that most of them agree with, unless chance explains it. */
+  /** The motion that most matches agree with; empty when chance explains that many. */
   std::optional<RelativePose> suggest(const Correspondences& matches);
   RelativePose refine(const RelativePose& motion, const Correspondences& support) const;
   void keepTheBest();

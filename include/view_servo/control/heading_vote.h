@@ -12,7 +12,7 @@
 
 namespace view_servo
 {
-/** Matched level points (planar_motion.h) with what the matcher thinks of each. */
+/** Matched level points (planar_motion.h), each with the weight that the matcher gives it. */
 struct HeadingEvidence
 {
   Correspondences pairs;
@@ -22,11 +22,11 @@ struct HeadingEvidence
 /** Options of the heading vote. */
 struct HeadingVoteParams
 {
-  int bins = 181;               ///< of the histogram over [-pi/2, pi/2], >= 3
-  double margin = 0.17;         ///< K: headings nearer to +-pi/2 are too uncertain to be taken [rad], [0, pi/2)
-  double smoothing = 0.02;      ///< sd of the Gaussian that votes are spread by [rad], >= 0
-  double narrowing = 0.7;       ///< of the region of interest when the global maximum is inside, (0, 1]
-  double widening = 1.3;        ///< of it when it is not, >= 1
+  int bins = 181;           ///< of the histogram over [-pi/2, pi/2], >= 3
+  double margin = 0.17;     ///< K: headings closer than this to +-pi/2 are too uncertain to be chosen [rad], [0, pi/2)
+  double smoothing = 0.02;  ///< standard deviation of the Gaussian over which a vote is spread [rad], >= 0
+  double narrowing = 0.7;   ///< factor of the region's width when the highest peak of all is inside, (0, 1]
+  double widening = 1.3;    ///< factor of the region's width when it is outside, >= 1
   double min_half_width = 0.1;  ///< of the region [rad], > 0
 
   /** All faults, one a line; empty when the parameters are usable. */
@@ -39,8 +39,8 @@ std::vector<Parameter> parameters(HeadingVoteParams& params);
 /**
  * Votes for the direction to the stored view (thesis 5.2). Each match gives the line through its reference and its
  * current position, both seen with the reference's orientation; where it meets the horizon is a candidate epipole. The
- * histogram runs over headings in the current camera, from -pi/2 (right) to pi/2 (left). It does not tell ahead from
- * behind.
+ * histogram runs over headings in the current camera, from -pi/2 (right) to pi/2 (left). It does not tell whether the
+ * view lies ahead or behind.
  */
 class HeadingHistogram
 {

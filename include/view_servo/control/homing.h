@@ -26,8 +26,8 @@ namespace view_servo
 {
 enum class HomingMode
 {
-  SERVO,  ///< all that this package knows
-  THESIS  ///< chapter 5 as it is printed: no rotation, goal ahead, steps, stop by correlation
+  SERVO,  ///< hypotheses from matches, then docking in image space
+  THESIS  ///< chapter 5 as printed: no rotation, the view ahead, step by step, arrival by correlation
 };
 
 /** Options of homing. */
@@ -38,23 +38,23 @@ struct HomingParams
   HeadingHypothesesParams hypotheses;
   ArrivalDetectorParams arrival;
   ViewTrackerParams tracker;
-  double lost_timeout = 10.0;  ///< without a trace of the view, after which homing gives up [s], > 0
+  double lost_timeout = 10.0;  ///< homing gives up after this time without a sign of the view [s], > 0
 
   // Mode SERVO.
-  double gain = 1.0;                   ///< of the approach: speed per distance [1/s], > 0
+  double gain = 1.0;                   ///< speed per distance of the view [1/s], > 0
   double turn_gain = 1.0;              ///< turn rate per yaw error [1/s], > 0
-  double blind_speed = 0.1;            ///< while only the heading is known [m/s], > 0
-  double distance_tolerance = 0.002;   ///< of having arrived [m], > 0
-  double yaw_tolerance = 0.002;        ///< likewise [rad], > 0
-  double dwell = 0.5;                  ///< time that the base has to stay within the tolerances [s], >= 0
-  double arrival_distance = 0.01;      ///< to the view, within which it counts as reached though still driving [m], > 0
-  double arrival_yaw = 0.0175;         ///< likewise [rad], > 0
-  double docking_displacement = 40.0;  ///< of the view's points, below which homing docks [px], > 0
-  double min_similarity = 0.3;         ///< of the gradients where homing may end, [-1, 1)
+  double blind_speed = 0.1;            ///< speed while only the heading is known [m/s], > 0
+  double distance_tolerance = 0.002;   ///< distance from the view at which the base has arrived [m], > 0
+  double yaw_tolerance = 0.002;        ///< yaw error at which it has arrived [rad], > 0
+  double dwell = 0.5;                  ///< time that the base has to stay within both tolerances [s], >= 0
+  double arrival_distance = 0.01;      ///< within it the view counts as reached, though the base still drives [m], > 0
+  double arrival_yaw = 0.0175;         ///< likewise, of the yaw error [rad], > 0
+  double docking_displacement = 40.0;  ///< homing docks below this median displacement of the view's points [px], > 0
+  double min_similarity = 0.3;         ///< homing ends only where gradientSimilarity() is at least this, [-1, 1)
 
   // Mode THESIS.
-  double step = 0.02;        ///< between two headings [m], > 0
-  double near_step = 0.01;   ///< after the rise of the correlation [m], > 0
+  double step = 0.02;        ///< length of a step, after which the heading is found anew [m], > 0
+  double near_step = 0.01;   ///< the same after the rise of the correlation [m], > 0
   double step_speed = 0.08;  ///< [m/s], > 0
 
   /** All faults, one a line; empty when the parameters are usable. */
@@ -68,14 +68,14 @@ enum class HomingState
 {
   ACQUIRING,    ///< the view has not been found yet
   APPROACHING,  ///< its direction is known
-  NEAR,         ///< what is seen begins to look like it
+  NEAR,         ///< what is seen begins to look like the view
   DOCKING,      ///< the last part, in image space
   ARRIVED,
-  LOST,   ///< it was known and is not found any more; the base waits
-  FAILED  ///< given up
+  LOST,   ///< the view was known and is not found any more; the base waits
+  FAILED  ///< homing has given up
 };
 
-/** What homing knows after an image. NaN where it does not. */
+/** What homing knows after an image; numbers that it does not know are NaN. */
 struct HomingReport
 {
   double stamp = 0.0;  ///< of the image
@@ -83,13 +83,13 @@ struct HomingReport
   std::string reason;                                         ///< of the state, in one line
   bool at_view = false;                                       ///< within arrival_distance and arrival_yaw
   double heading = std::numeric_limits<double>::quiet_NaN();  ///< direction to the view's base pose, in base_link [rad]
-  double yaw_error = std::numeric_limits<double>::quiet_NaN();  ///< that the base has yet to turn by [rad]
+  double yaw_error = std::numeric_limits<double>::quiet_NaN();  ///< angle left to turn [rad]
   double distance = std::numeric_limits<double>::quiet_NaN();   ///< left to drive [m]
   double confidence = 0.0;                                      ///< share of the matches or points that agree, [0, 1]
   std::vector<double> histogram;
-  double roi_min = std::numeric_limits<double>::quiet_NaN();  ///< [rad]
+  double roi_min = std::numeric_limits<double>::quiet_NaN();  ///< where the next heading is expected [rad]
   double roi_max = std::numeric_limits<double>::quiet_NaN();
-  double similarity = std::numeric_limits<double>::quiet_NaN();    ///< gradient correlation, -1..1
+  double similarity = std::numeric_limits<double>::quiet_NaN();    ///< gradientSimilarity(), in [-1, 1]
   double displacement = std::numeric_limits<double>::quiet_NaN();  ///< median, of the view's points [px]
   int inliers = 0;
 };
@@ -116,11 +116,11 @@ public:
   Homing(const Homing&) = delete;
   Homing& operator=(const Homing&) = delete;
 
-  /** Base in odometry's frame. */
+  /** Pose of the base in odometry's frame. */
   void addOdometry(double stamp, const PlanarPose& base_in_odom)
   {
     odometry_.add(stamp, base_in_odom);
-    takeOdometry(base_in_odom);
+    onOdometry(base_in_odom);
   }
 
   /**
@@ -132,7 +132,7 @@ public:
   /** @param grey 8-bit, one channel. @throws std::invalid_argument when it has another size than the stored view. */
   void addImage(double stamp, const cv::Mat& grey);
 
-  /** Where to go, by all that has been added; STAND unless it is known. */
+  /** Where to go by all that has been added; STAND while that is not known. */
   virtual Course course() const = 0;
 
   /** What the base should do now, by the newest odometry, before limits. */
@@ -150,11 +150,11 @@ public:
 protected:
   Homing(const HomingParams& params, HomingTarget target);
 
-  virtual void takeOdometry(const PlanarPose& /*base_in_odom*/)
+  virtual void onOdometry(const PlanarPose& /*base_in_odom*/)
   {
   }
-  virtual void takeMatches(double stamp, const HeadingEvidence& evidence, const PlanarPose& camera_in_odom) = 0;
-  virtual void takeImage(double stamp, const cv::Mat& grey) = 0;
+  virtual void onMatches(double stamp, const HeadingEvidence& evidence, const PlanarPose& camera_in_odom) = 0;
+  virtual void onImage(double stamp, const cv::Mat& grey) = 0;
 
   void setState(HomingState state, const std::string& reason)
   {
@@ -171,7 +171,7 @@ protected:
   OdometryHistory odometry_;
   HomingReport report_;
   double started_;     ///< stamp of the first image; NaN before it
-  double last_trace_;  ///< stamp of the last sign of the view
+  double last_trace_;  ///< stamp of the last image or matches that showed the view
 
 private:
   cv::Mat reference_gradients_;

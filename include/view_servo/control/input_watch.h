@@ -8,8 +8,9 @@
 namespace view_servo
 {
 /**
- * Watches over an input that a moving robot depends on: stale when nothing came for too long, by a steady clock, which
- * neither a paused bag nor a set system clock disturbs. Fresh input makes it good again. Safe to use from several threads.
+ * Tells whether an input that a moving robot depends on has become stale, which it is when nothing came for longer than
+ * a timeout. Time is that of a steady clock: a paused bag does not stop it, nor does setting the system's clock disturb
+ * it. New input makes it fresh again. Safe to use from several threads.
  */
 class InputWatch
 {
@@ -21,6 +22,7 @@ public:
   {
   }
 
+  /** Input has come. */
   void feed()
   {
     last_ = Clock::now();

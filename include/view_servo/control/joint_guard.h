@@ -8,7 +8,7 @@
 
 namespace view_servo
 {
-/** What a joint can do [rad] or [m]. */
+/** The range of a joint's positions [rad] or [m]. */
 struct JointLimits
 {
   double lower;
@@ -16,34 +16,36 @@ struct JointLimits
 };
 
 /**
- * Watches over an arm's joints: which of them is at a limit and does not come away from it. Times in seconds of any one clock. What was
- * said of a joint does not count for ever.
+ * Watches the joints of an arm and names one that is at a limit and does not come away from it. Times are seconds of
+ * any one clock.
  */
 class JointGuard
 {
 public:
   /**
-   * @param margin that counts as being at a limit, as the limits' unit, >= 0.
-   * @param max_age after which what was said of a joint does not count any more [s], > 0.
+   * @param margin a joint is at a limit when it is closer to it than this, in the limits' unit, >= 0.
+   * @param max_age a joint that was not heard of for longer is left out [s], > 0.
    */
   JointGuard(std::map<std::string, JointLimits> limits, double margin, double max_age);
 
   /**
-   * Where joints are. Those without limits do not matter, others may be missing.
-   * @param velocities as many as positions, or none: then they follow from the positions.
-   * @return which position is not believed, as it is no number or lies far beyond the limits; empty: all are.
+   * Where joints are. Those without limits are ignored, and some may be missing.
+   * @param velocities as many as positions; if not, they are computed from the positions.
+   * @return a message naming a position that is ignored, as it is no number or lies far beyond the limits; empty: none
+   * is.
    */
   std::string add(double time, const std::vector<std::string>& names, const std::vector<double>& positions,
                   const std::vector<double>& velocities);
 
   /**
-   * Called while the arm is to move: the joint that goes further towards a limit that it is at, or stands there for longer
-   * than an arm takes to follow, and where it is; empty: none.
+   * Called while the arm is to move.
+   * @return a message naming a joint at a limit that moves on towards it, or has been there for longer than an arm
+   * takes to follow a command, and its position; empty: there is none.
    */
   std::string problem(double time);
 
-  /** Called when the arm is not to move. */
-  void rest();
+  /** Called when the arm is not to move: the time that joints have been at their limits begins anew. */
+  void clearStuck();
 
   bool empty() const
   {

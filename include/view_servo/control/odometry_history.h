@@ -18,10 +18,13 @@ public:
   {
   }
 
-  /** Base in odometry's frame. When time has gone back, what was known before is forgotten. */
+  /** Pose of the base in odometry's frame. When time has gone back, all poses before are forgotten. */
   void add(double stamp, const PlanarPose& pose);
 
-  /** Interpolated; up to `reach` [s] beyond the newest it is taken to go on as it did. Empty where nothing is known. */
+  /**
+   * The pose at a time, interpolated; up to `reach` [s] after the newest one it is extrapolated. Empty where nothing is
+   * known.
+   */
   std::optional<PlanarPose> at(double stamp, double reach = 0.2) const;
 
   std::optional<PlanarPose> newest() const;

@@ -21,15 +21,15 @@ namespace view_servo
 /** Options of 2.5D servoing. */
 struct Servo25dParams
 {
-  double gain = 1.0;                     ///< rate at which a large error decays [1/s], > 0
-  double near_gain = 2.5;                ///< likewise, of a small one [1/s], >= gain
-  double margin = 0.1;                   ///< of the image's sides, which the chosen point stays out of, [0, 0.3]
-  double distance = 0.5;                 ///< d, of the plane from the stored view, until it is known [m], > 0
-  double translation_tolerance = 0.001;  ///< of being at the view [m], > 0
-  double rotation_tolerance = 0.0015;    ///< likewise [rad], > 0
-  double dwell = 0.5;                    ///< time within the tolerances [s], >= 0
-  double loss_tolerance = 0.12;          ///< without the view, bridged by what was sent; then it stands [s], [0, 0.5]
-  double lost_timeout = 5.0;             ///< without the view, after which it gives up [s], > 0
+  double gain = 1.0;       ///< rate at which a large error decays [1/s], > 0
+  double near_gain = 2.5;  ///< rate at which a small error decays [1/s], >= gain
+  double margin = 0.1;     ///< part of the image at each border that the chosen point stays out of, [0, 0.3]
+  double distance = 0.5;   ///< d: distance of the plane from the stored view, until it is known [m], > 0
+  double translation_tolerance = 0.001;  ///< error of the camera's position at which it has converged [m], > 0
+  double rotation_tolerance = 0.0015;    ///< error of its rotation at which it has converged [rad], > 0
+  double dwell = 0.5;                    ///< time that it has to stay within both tolerances [s], >= 0
+  double loss_tolerance = 0.12;  ///< time without the view that sent commands bridge; then it stands [s], [0, 0.5]
+  double lost_timeout = 5.0;     ///< servoing gives up after this time without the view [s], > 0
 
   /** All faults, one a line; empty when the parameters are usable. */
   std::vector<std::string> validate() const;
@@ -38,7 +38,7 @@ struct Servo25dParams
 /** Names, units and ranges of these parameters, by which validate() checks them. */
 std::vector<Parameter> parameters(Servo25dParams& params);
 
-/** What has to be brought to its place. */
+/** The point that servoing brings to its place, and the camera that sees it. */
 struct ServoTarget
 {
   Eigen::Matrix3d k;      ///< camera matrix, without distortion [px]
@@ -46,7 +46,7 @@ struct ServoTarget
   Eigen::Vector2d point;  ///< the chosen point in the stored view, on the plane [px]
 };
 
-/** What an image says of the plane. */
+/** What an image shows of the plane. */
 struct PlaneView
 {
   double stamp = 0.0;              ///< of the image [s]
@@ -69,10 +69,10 @@ Servo25dError servo25dError(const EuclideanHomography& motion, const Eigen::Vect
 enum class ServoState
 {
   ACQUIRING,  ///< the view has not been found yet
-  SERVOING,   ///< drives
-  LOST,       ///< stands still until the view is found again
-  CONVERGED,  ///< at the view
-  FAILED      ///< given up
+  SERVOING,   ///< the camera drives
+  LOST,       ///< the camera stands until the view is found again
+  CONVERGED,  ///< the camera is at the view
+  FAILED      ///< servoing has given up
 };
 
 /** What servoing does, and why. Errors are NaN until known. */
@@ -94,35 +94,42 @@ Progress toProgress(const ServoReport& report);
 
 /**
  * Brings a camera to a stored view of a plane by 2.5D servoing (thesis 8.6; Malis, Chaumette & Boudet 1999): a chosen
- * point is led by where it is in the image, the depth by the ratio of its depths, the turn by the rotation, and the
- * interaction matrix, block triangular, keeps them apart. Features, matrices and control law are ViSP's (GPL-2).
+ * point is controlled by its position in the image, the depth by the ratio of the point's depths, and the orientation
+ * by the rotation that is left; the interaction matrix is block triangular, which decouples them. Features, matrices
+ * and control law are ViSP's (GPL-2).
  *
- * A wrong distance of the plane makes the camera slower or faster, and lets turns move the chosen point, which they do
- * not with the right one. Adaptive gains keep it in the image: turn and depth slow down to zero as it nears a margin inside the
- * border, in x or in y, while it is led back as before; so it turns round there whatever the distance is.
+ * A wrong distance of the plane makes the camera slower or faster, and makes rotations shift the chosen point; with the
+ * right distance they do not. Adaptive gains keep the point in the image: the closer it comes to a margin inside the
+ * border, in x or in y, the slower the camera turns and changes the depth, while the point is led back as fast as ever.
+ * So the point turns back at the margin, whatever the distance.
  *
- * What an image says is old when it is known: the camera has moved on as it was told to since. This is fed forward, so
- * that errors decay as commanded.
+ * When an image has been evaluated, the camera has already moved on by the commands since. This motion is fed forward,
+ * so that errors decay as commanded.
  *
- * Limits of speed and acceleration are left to a TwistLimiter, times to the caller.
+ * A TwistLimiter has to keep the limits of speed and acceleration; times are the caller's.
  */
 class Servo25d
 {
 public:
   /**
-   * @throws std::invalid_argument with all faults of the parameters, or when the chosen point is not in the image or lies
-   * within the margin.
+   * @throws std::invalid_argument with all faults of the parameters, or when the chosen point is not in the image or
+   * lies within the margin.
    */
   Servo25d(const ServoTarget& target, const Servo25dParams& params);
   ~Servo25d();
 
-  /** An image in which the plane was found. Numbers that are not finite are a loss; an older image than the last is none. */
+  /**
+   * An image in which the plane was found. One with numbers that are not finite is a loss; one older than the last is
+   * ignored.
+   */
   void add(const PlaneView& view);
 
-  /** An image in which it was not; a few are bridged. @param stamp of the image [s]. @param reason what there is to say of it. */
+  /**
+   * An image in which the plane was not found. @param stamp of the image [s]. @param reason why not, for the report.
+   */
   void addLoss(double stamp, const std::string& reason);
 
-  /** What the camera was told to do from a time on [s]. */
+  /** The twist that was sent, and holds from a time on [s]. */
   void sent(double time, const Twist& twist);
 
   /** The twist wanted at a time [s], before limits; zero unless the state is SERVOING or CONVERGED. */
@@ -141,11 +148,11 @@ private:
     Twist twist;
   };
 
-  /** How the camera has moved by what was sent: X_end = motion X_begin. */
+  /** How the camera has moved by the twists that were sent: X_end = motion X_begin. */
   Eigen::Isometry3d motionSince(double begin, double end) const;
   Eigen::Vector2d gainsAt(const Eigen::Vector2d& pixel) const;
   double distance() const;
-  void judge(double stamp);
+  void updateReport(double stamp);
 
   Servo25dParams params_;
   ServoTarget target_;

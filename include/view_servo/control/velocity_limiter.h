@@ -18,7 +18,7 @@ using BaseVelocity = Eigen::Vector3d;
 /** A camera's velocity: [v; ω] in its optical frame [m/s, rad/s]. */
 using Twist = Eigen::Matrix<double, 6, 1>;
 
-/** What a base or a camera may do. */
+/** Limits of the motion of a base or a camera. */
 struct VelocityLimits
 {
   double max_speed = 0.25;             ///< [m/s], > 0
@@ -33,12 +33,12 @@ struct VelocityLimits
 /** Names, units and ranges of these parameters, by which validate() checks them. */
 std::vector<Parameter> parameters(VelocityLimits& params);
 
-/** What a camera in an arm's hand may do, unless told otherwise. */
+/** Default limits of a camera in an arm's hand. */
 inline const VelocityLimits ARM_LIMITS{ 0.15, 0.6, 0.5, 2.0 };
 
 /**
- * Keeps commands within limits: the whole velocity is scaled, so that its direction stays, and changes gradually. Its
- * first `LINEAR` numbers are a speed, the others, `ANGULAR` of them, a turn rate.
+ * Keeps velocities within limits. A velocity is scaled as a whole, so that its direction stays, and changes gradually.
+ * Its first LINEAR components are a linear velocity, the ANGULAR others a turn rate.
  */
 template <int LINEAR, int ANGULAR>
 class VelocityLimiter
@@ -51,7 +51,7 @@ public:
   {
   }
 
-  /** The velocity allowed after `dt` [s] on the way to the one wanted. Zero, and what is not finite, stops at once. */
+  /** The velocity allowed `dt` [s] after the last one. A wanted velocity that is zero or not finite stops at once. */
   Velocity next(const Velocity& wanted, double dt)
   {
     if (!wanted.allFinite() || wanted.isZero(0.0))

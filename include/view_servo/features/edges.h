@@ -16,8 +16,8 @@ namespace view_servo
 struct EdgeParams
 {
   double sigma = 1.0;           ///< Gaussian derivative scale [px], [0.6, 20]
-  double low_threshold = 2.0;   ///< all pixels of a chain are at least as steep [grey levels/px], > 0
-  double high_threshold = 4.0;  ///< some pixel of a chain is at least as steep [grey levels/px], >= low_threshold
+  double low_threshold = 2.0;   ///< least gradient of every pixel of a chain [grey levels/px], > 0
+  double high_threshold = 4.0;  ///< least gradient of one pixel of a chain [grey levels/px], >= low_threshold
   int min_points = 5;           ///< shorter chains are dropped, >= 2
 
   /** All faults, one a line; empty when the parameters are usable. */
@@ -38,9 +38,9 @@ std::vector<Parameter> edgeParameters(double& sigma, double& low_threshold, doub
 using EdgeChain = std::vector<Eigen::Vector2d>;
 
 /**
- * The edges of an image, but for its outermost two pixels; where several meet, those that do not continue smoothly end.
- * White noise of deviation s makes gradients of deviation s / (5 sigma²) in u and in v: with a high threshold of four
- * times that it makes few edges.
+ * The edges of an image, except in its outermost two pixels. Where several edges meet, those end that do not continue
+ * smoothly. White noise of deviation s makes gradients of deviation s / (5 sigma²) in u and in v: with a high threshold
+ * of four times that it makes few edges.
  * @param grey 8-bit, one channel.
  * @param region where edges are wanted: those of the whole image, cut off at its limits; empty = everywhere.
  * @throws std::invalid_argument when the image has the wrong type.

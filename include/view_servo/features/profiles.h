@@ -27,7 +27,7 @@ struct ProfileParams
   double max_length = 200.0;  ///< D_c: longest profile (RADIUS) [px], > min_length
   double min_length = 10.0;   ///< shortest profile [px], >= 2
   int coefficients = 8;       ///< N_f: 4, 6 or 8 Fourier features a profile
-  double min_contrast = 6.0;  ///< profiles whose intensity stays closer to its mean than this say nothing [grey levels]
+  double min_contrast = 6.0;  ///< profiles that differ less than this from their mean are left out [grey levels]
 
   /** All faults, one a line; empty when the parameters are usable. */
   std::vector<std::string> validate() const;
@@ -79,9 +79,10 @@ constexpr float reversalSign(int feature_index)
 ProfileSet extractProfiles(const cv::Mat& image, const std::vector<Corner>& corners, const ProfileParams& params);
 
 /**
- * The raw features of one profile before normalisation over the image (brightness normalised as
- * (p - mean) / max|p - mean|; eq. 6.1 divides by max(p), which depends on an offset of the light).
- * @return false when its contrast is below `min_contrast` or an end lies outside the image; `features` is then untouched.
+ * The raw features of one profile before normalisation over the image. Brightness is normalised as
+ * (p - mean) / max|p - mean|; eq. 6.1 divides by max(p), which depends on an offset of the light.
+ * @return false when its contrast is below `min_contrast` or an end lies outside the image; `features` is then
+ * untouched.
  */
 bool profileFeatures(const cv::Mat& image, const Eigen::Vector2d& start, const Eigen::Vector2d& end,
                      const ProfileParams& params, float* features);

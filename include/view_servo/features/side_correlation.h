@@ -11,12 +11,12 @@ namespace view_servo
 {
 /**
  * How alike the strips beside a segment and its counterpart are: samples of the reference image, 1 to 8.5 px from the
- * segment, are compared with the current image at the places where a homography sends them, along the part of the segment
- * that both images show. Each side has its own zero-mean normalised correlation, and the larger one is returned, since one
- * side may be background that moves differently.
+ * segment, are compared with the current image at the places where a homography sends them, along the part of the
+ * segment that both images show. Each side has its own zero-mean normalised correlation, and the larger one is
+ * returned, since one side may be background that moves differently.
  * @param reference, current 8-bit, one channel, usually smoothed. @param h x_cur ~ H x_ref [px].
- * @return in [-1, 1]; nearly 0 where the intensities are flat, 0 when the segment maps to or beyond infinity, and -1 when
- * on neither side enough samples lie within both images.
+ * @return in [-1, 1]; nearly 0 where the intensities are flat, 0 when the segment maps to or beyond infinity, and -1
+ * when on neither side enough samples lie within both images.
  */
 double sideCorrelation(const cv::Mat& reference, const cv::Mat& current, const Eigen::Matrix3d& h,
                        const Segment& reference_segment, const Segment& current_segment);

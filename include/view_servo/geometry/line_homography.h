@@ -47,9 +47,10 @@ struct AffinityLimits
 };
 
 /**
- * Weighted least-squares affine map of n >= 3 points: intersections of lines, or end points of segments. Third row (0, 0, 1).
- * @param from, to, weights arrays of n [px]. @return x_to = A x_from; empty when the points `from` are nearly collinear, or
- * when the map mirrors or distorts more than the limits allow.
+ * Weighted least-squares affine map, of third row (0, 0, 1), of n >= 3 points: intersections of lines, or end points of
+ * segments.
+ * @param from, to, weights arrays of n [px]. @return x_to = A x_from; empty when the points `from` are nearly
+ * collinear, or when the map mirrors or distorts more than the limits allow.
  */
 std::optional<Eigen::Matrix3d> plausibleAffinity(const Eigen::Vector2d* from, const Eigen::Vector2d* to,
                                                  const double* weights, int n, const AffinityLimits& limits);

@@ -24,8 +24,8 @@ public:
   }
 
   /**
-   * Whether at() may be called: 0 <= u < width - 1 and 0 <= v < height - 1, as interpolation reads the pixel to the right
-   * and the two below. Compares in the precision of its arguments. False for NaN.
+   * Whether at() may be called: 0 <= u < width - 1 and 0 <= v < height - 1, as interpolation reads the pixel to the
+   * right and the two below. Compares in the precision of its arguments. False for NaN.
    */
   template <typename Real>
   bool contains(Real u, Real v) const

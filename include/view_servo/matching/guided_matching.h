@@ -14,11 +14,11 @@
 
 namespace view_servo
 {
-/** Options of looking for more matches along a geometry that was found. */
+/** Options of the search for more matches that agree with a geometry. */
 struct GuidedParams
 {
   int patch_radius = 6;          ///< patches of (2 r + 1)² pixels are compared [px], 1 to 50
-  double min_correlation = 0.6;  ///< of the current patch with the warped reference patch, [0, 1)
+  double min_correlation = 0.6;  ///< least one of the current patch with the warped reference patch, [0, 1)
 
   /** All faults, one a line; empty when the parameters are usable. */
   std::vector<std::string> validate() const;
@@ -40,17 +40,17 @@ struct GuidedMatch
  * a pixel, at which the reference patch, warped by the homography's affine approximation, has its largest zero-mean
  * normalised correlation with the current image. So a corner is found again whether or not the detector found it.
  * Corners whose best place lies on the rim of the search region, or correlates too little, are left out.
- * @param radius of the search region around the prediction, in each direction [px]
- * Images are 8-bit grey.
+ * @param reference, current 8-bit, one channel.
+ * @param radius of the search region around the prediction, in each direction [px].
  */
 std::vector<GuidedMatch> searchAlongHomography(const cv::Mat& reference, const std::vector<Corner>& corners,
                                                const cv::Mat& current, const Eigen::Matrix3d& h, double radius,
                                                const GuidedParams& params);
 
 /**
- * Associates the corners that were associated before and agree with a fundamental matrix (x_curᵀ F x_ref = 0) up to
- * `threshold`: Sampson distance [px]. A line says less than a point, so the former association decides with: weights
- * are the fit, 0 to 1, plus the former weight as a fraction of the largest (thesis 9.6.3).
+ * Keeps those associations that agree with a fundamental matrix (x_curᵀ F x_ref = 0) to within `threshold`, a Sampson
+ * distance [px]. An epipolar line restricts less than a point would, so the former weights still count: the new weight
+ * is the fit, 0 to 1, plus the former weight as a fraction of the largest (thesis 9.6.3).
  */
 AssociationMatrix associateAlongFundamental(const AssociationMatrix& association,
                                             const std::vector<Corner>& reference_corners,

@@ -18,13 +18,13 @@
 
 namespace view_servo
 {
-/** Options of what line matching asks of each image. */
+/** Options of the data on each image that line matching needs. */
 struct LineFeatureParams
 {
   LineGroupParams groups;
-  int max_grouped = 400;     ///< the longest segments form groups and seeds; all take part in growing, >= 1
-  int neighbours = 40;       ///< nearest segments of each that judge a hypothesis, >= 6
-  int neighbour_pairs = 15;  ///< nearest segments of each that make one, >= 2
+  int max_grouped = 400;     ///< this many of the longest segments form groups and seeds; regions grow over all, >= 1
+  int neighbours = 40;       ///< nearest segments of each, by which a hypothesis is judged, >= 6
+  int neighbour_pairs = 15;  ///< nearest segments of each that form a hypothesis with it, >= 2
 
   /** All faults, one a line; empty when the parameters are usable. */
   std::vector<std::string> validate() const;
@@ -34,11 +34,11 @@ struct LineFeatureParams
 std::vector<Parameter> parameters(LineFeatureParams& params);
 
 /**
- * The line segments of an image with all that matching asks of them: which lies near which, where their lines meet,
- * what lies beside them, and their groups. Computed once for a stored view. Safe to use from several threads.
+ * The line segments of an image with all that matching needs: their neighbours, where their lines meet, the image
+ * beside them, and their groups. Computed once for a stored view. Safe to use from several threads.
  *
- * Segments are kept longest first; input() says which one of those given it was. Memory is bounded by
- * segments x neighbours, and the groups by max_grouped x neighbours² / 2.
+ * Segments are kept longest first; input() says which one of those given it was. Memory is bounded by segments x
+ * neighbours, and the groups by max_grouped x neighbours² / 2.
  */
 class LineFeatures
 {
@@ -73,12 +73,12 @@ public:
   {
     return directions_[static_cast<std::size_t>(i)];
   }
-  /** Number of segments that form groups: the first so many. */
+  /** Only the first groupedCount() segments, the longest, form groups. */
   int groupedCount() const
   {
     return static_cast<int>(near_.size());
   }
-  /** Index of a segment among those given. */
+  /** Index of a segment among those given to the constructor. */
   int input(int i) const
   {
     return input_[static_cast<std::size_t>(i)];
@@ -93,7 +93,7 @@ public:
   {
     return near_[static_cast<std::size_t>(i)];
   }
-  /** The nearest whose lines meet that of a grouped segment within max_distance of both, nearest first. */
+  /** The nearest segments whose lines meet that of a grouped segment within max_distance of both, nearest first. */
   const std::vector<Meeting>& meetings(int i) const
   {
     return meetings_[static_cast<std::size_t>(i)];
@@ -102,8 +102,8 @@ public:
   const LineIndex& index(LineGrouping groups) const;
 
   /**
-   * Puts all segments into `found` that may lie beside a segment and point the same way, and few others: within
-   * `tolerance` [px] across and within `max_angle_deg` < 90.
+   * Puts into `found` all segments that lie within `tolerance` [px] across of a segment and within `max_angle_deg` < 90
+   * of its direction, and a few others.
    */
   void alongside(const Segment& segment, double tolerance, double max_angle_deg, std::vector<int>& found) const;
 
@@ -116,7 +116,7 @@ private:
     Eigen::Vector2d across;         ///< unit vector
     std::vector<int> segments;      ///< by their least offset across
     std::vector<double> low;        ///< of each that offset [px]
-    std::vector<double> high_here;  ///< largest offset of a segment up to each [px]
+    std::vector<double> high_here;  ///< largest offset of all segments up to each [px]
   };
 
   static int directionBin(const Eigen::Vector2d& direction);

@@ -18,8 +18,8 @@ namespace view_servo
 {
 /** @file
  * Groups of line segments and their combinatorial structure (thesis 4.1-4.4; Carlsson 1996): on which side of one
- * segment the end points of another lie. It does not change with the viewpoint as long as each point keeps its side, and
- * never does for coplanar segments in front of the camera.
+ * segment the end points of another lie. It does not change with the viewpoint as long as each point keeps its side,
+ * and never does for coplanar segments in front of the camera.
  */
 
 enum class LineGrouping
@@ -28,7 +28,7 @@ enum class LineGrouping
   TRIPLETS  ///< two pairs that share a segment
 };
 
-/** What tells a segment's start from its end, and the first segment of a pair from the second. */
+/** How a segment's start is told from its end, and the first segment of a pair from the second. */
 enum class LineOrder
 {
   CONTRAST,  ///< start and end as given (brighter side left); a pair in the sense of rotation: free of roll

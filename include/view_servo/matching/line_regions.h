@@ -15,23 +15,23 @@
 namespace view_servo
 {
 /** @file
- * From votes to matches: parts of the image, each with one homography under which neighbouring segments fall on segments.
+ * From votes to matches: regions of the image, in each of which one homography maps neighbouring segments onto
+ * segments.
  */
 
 /** Options of finding regions. */
 struct LineRegionParams
 {
-  int max_candidates = 8;         ///< counterparts tried for a segment, those with most votes, >= 1
-  int max_trials = 600;           ///< candidates tried in all, those first that stand out most, >= 1
-  int max_companions = 12;        ///< matches of neighbours tried with it, those with most votes, >= 2
-  int max_hypotheses = 3;         ///< affine maps scored for a candidate, those whose segments agree best, >= 1
-  double affine_tolerance = 3.0;  ///< of segments under a local affine map, across [px], > 0
-  double tolerance = 2.0;         ///< of segments under a homography, across [px], > 0
+  int max_candidates = 8;         ///< counterparts tried for a segment, those of most votes, >= 1
+  int max_trials = 600;           ///< candidates tried in all, beginning with those that stand out most, >= 1
+  int max_companions = 12;        ///< matches of neighbours tried with a candidate, those of most votes, >= 2
+  int max_hypotheses = 3;         ///< affine maps scored for a candidate, those whose three segments agree best, >= 1
+  double affine_tolerance = 3.0;  ///< distance across of segments that agree with a local affine map [px], > 0
+  double tolerance = 2.0;         ///< distance across of segments that agree with a homography [px], > 0
   double max_angle_deg = 10.0;    ///< between a segment and its counterpart, (0, 45)
   double min_support = 5.0;       ///< of a region: sum over its matches of 0.3 + 0.7 share, > 0
-  double min_correlation =
-      0.55;  ///< of the intensities beside a segment, on its better side, with its counterpart's, [-1, 1)
-  double min_mean_correlation = 0.6;  ///< of a region's matches, [-1, 1)
+  double min_correlation = 0.55;  ///< least sideCorrelation() of a match, [-1, 1)
+  double min_mean_correlation = 0.6;  ///< least mean of a region's matches, [-1, 1)
 
   /** All faults, one a line; empty when the parameters are usable. */
   std::vector<std::string> validate() const;
@@ -45,8 +45,8 @@ struct SegmentMatch
 {
   int reference;
   int current;
-  double share;              ///< of what the two cover that both show, in the current image, (0, 1]
-  double correlation = 0.0;  ///< of what lies beside them, [-1, 1]
+  double share;              ///< length side by side over the length that both cover, in the current image, (0, 1]
+  double correlation = 0.0;  ///< sideCorrelation(), [-1, 1]
 };
 
 /** Matches of neighbouring segments that agree with one homography. */
@@ -59,16 +59,16 @@ struct LineRegion
 
 /**
  * Regions, in the order they were found (strongest votes first). Each candidate match is tried with those neighbours
- * that meet its segments alike: three lines give an affine map, the segments around say how good it is, and a map with
- * enough support becomes a homography that grows outwards as long as segments agree. A segment that is in a region
- * starts none. Time is bounded by max_trials x (max_companions² / 2 + max_hypotheses x neighbours²).
+ * that meet its segments alike: three lines give an affine map, which is judged by the segments around. A map with
+ * enough support becomes a homography, whose region grows outwards as long as segments agree. A segment that is in a
+ * region starts no other. Time is bounded by max_trials x (max_companions² / 2 + max_hypotheses x neighbours²).
  */
 std::vector<LineRegion> findLineRegions(const LineFeatures& reference, const LineFeatures& current,
                                         const AssociationMatrix& association, const LineRegionParams& params);
 
 /**
- * The region that grows from a homography and the matches, at least three, that gave it; empty when what lies beside
- * its segments does not look alike.
+ * The region that grows from a homography and the matches, at least three, that gave it. Empty when the images beside
+ * its segments do not look alike.
  */
 std::optional<LineRegion> growLineRegion(const LineFeatures& reference, const LineFeatures& current,
                                          const Eigen::Matrix3d& h, const std::vector<SegmentMatch>& matches,

@@ -30,8 +30,9 @@ struct PointMatcherParams
   ProfileSearchParams search;
   AssignmentMethod assignment = AssignmentMethod::EXACT;
   bool cyclic_order = true;      ///< weigh associations by cyclic alignment of the profiles that voted (ch. 7)
-  double min_correlation = 0.7;  ///< profiles correlated less do not align (7.3), [0, 1)
-  int cyclic_entries = 5;        ///< aligned are a row's and a column's entries with that many most votes; 0 = all
+  double min_correlation = 0.7;  ///< profiles that correlate less are not aligned (7.3), [0, 1)
+  int cyclic_entries =
+      5;  ///< entries that are aligned: so many of each row and of each column, those of most votes; 0 = all
 
   /** All faults, one a line; empty when the parameters are usable. */
   std::vector<std::string> validate() const;
@@ -40,7 +41,7 @@ struct PointMatcherParams
 /** Names, units and ranges of these parameters, by which validate() checks them. */
 std::vector<Parameter> parameters(PointMatcherParams& params);
 
-/** What matching needs to know of one image. */
+/** What matching needs of one image. */
 struct PointFeatures
 {
   std::vector<Corner> corners;

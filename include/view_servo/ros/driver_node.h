@@ -373,7 +373,7 @@ private:
     circumstances.replaced = replaced_;
     circumstances.enabled = gate_.open();
     circumstances.cancelled = goal_->cancelled;
-    circumstances.heard = gate_.dryRun() || driver_.hasListener();
+    circumstances.has_listener = gate_.dryRun() || driver_.hasListener();
     circumstances.elapsed = std::chrono::duration<double>(Clock::now() - goal_->start).count();
     circumstances.timeout = goal_->timeout;
     circumstances.fault = jump;

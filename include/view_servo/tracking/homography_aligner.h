@@ -21,12 +21,12 @@ struct HomographyAlignerParams
 {
   int max_points = 200;          ///< corners of the stored view that are looked for, >= 12
   int patch_radius = 10;         ///< patches of (2 r + 1)² pixels are compared; on coarse levels smaller ones, 2 to 20
-  int levels = 4;                ///< of the pyramids, the images among them; more catch faster motion, 1 to 6
-  double min_correlation = 0.7;  ///< of a patch that is found again, [0, 1)
-  double max_residual = 2.0;     ///< of a point that supports the homography [px], > 0
-  int min_supporting = 15;       ///< points that make a homography, >= 5
-  double min_support = 0.25;     ///< part of the points in sight that makes one, (0, 1]
-  bool refine = true;            ///< all pixels of the region have the last word
+  int levels = 4;                ///< of the pyramids, the image included; more of them catch faster motion, 1 to 6
+  double min_correlation = 0.7;  ///< least one of a patch that is found again, [0, 1)
+  double max_residual = 2.0;     ///< largest one of a point that supports the homography [px], > 0
+  int min_supporting = 15;       ///< least number of points that support a homography, >= 5
+  double min_support = 0.25;     ///< least part of the points in sight that support it, (0, 1]
+  bool refine = true;            ///< whether all pixels of the region refine the result
 
   /** All faults, one a line; empty when the parameters are usable. */
   std::vector<std::string> validate() const;
@@ -35,7 +35,7 @@ struct HomographyAlignerParams
 /** Names, units and ranges of these parameters, by which validate() checks them. */
 std::vector<Parameter> parameters(HomographyAlignerParams& params);
 
-/** What the tracker says of an image. */
+/** The homography of an image, when there is one. */
 struct TrackedHomography
 {
   bool found = false;
@@ -47,16 +47,16 @@ struct TrackedHomography
 };
 
 /**
- * Finds the homography of a planar scene from one image to the next (thesis 8.3, 8.4), always against the stored view, so
- * that nothing drifts. Every corner is looked for where a predicted homography sends it: its patch, seen through that
- * homography, is aligned with the image by the inverse compositional method (Baker & Matthews 2004), from coarse to fine;
- * both are normalised to zero mean and unit norm, so that gain and offset of the light do not matter. As in the thesis no
- * point is followed from image to image: each is found anew or not, and RANSAC on the coarsest level and robust fits below
- * it, which weigh each patch by what its texture tells, decide which are believed. Hidden patches correlate too little and
- * drop out. All pixels of the region have the last word, in blocks, of which those that differ more than the others count
- * less.
+ * Finds the homography of a planar scene from one image to the next (thesis 8.3, 8.4), always against the stored view,
+ * so that nothing drifts. The patch of every corner is looked for where a predicted homography sends it, and aligned
+ * with the image by the inverse compositional method (Baker & Matthews 2004), from coarse to fine levels. Both are
+ * normalised to zero mean and unit norm, so that gain and offset of the light do not matter. As in the thesis no point
+ * is followed from image to image: each is found anew or not. RANSAC on the coarsest level decides which points are
+ * believed, and on finer levels robust fits do, which weigh each patch by the information of its texture. Hidden
+ * patches correlate too little and drop out. In the end all pixels of the region refine the homography, in blocks, of
+ * which those that differ more than the others count less.
  *
- * Stateless but for what it knows of the stored view; the caller predicts, from odometry or from the motion before.
+ * It keeps nothing from image to image; the caller predicts, from odometry or from the motion before.
  */
 class HomographyAligner
 {

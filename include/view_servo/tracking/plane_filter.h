@@ -19,9 +19,9 @@ namespace view_servo
 /** Options of the filter of planes and motions. */
 struct PlaneFilterParams
 {
-  double window = 0.1;        ///< way of the camera whose measurements are averaged, and that d takes [m], > 0
-  int max_measurements = 60;  ///< averaged at most, >= 2
-  double decision = 4.0;  ///< times by which the normals of one decomposition must scatter more than the other's, > 1
+  double window = 0.1;        ///< distance that averaged camera positions may span, and that d needs [m], > 0
+  int max_measurements = 60;  ///< most that are averaged, >= 2
+  double decision = 4.0;      ///< times that a decomposition's normals scatter more than the other's to be dropped, > 1
 
   /** All faults, one a line; empty when the parameters are usable. */
   std::vector<std::string> validate() const;
@@ -34,22 +34,25 @@ std::vector<Parameter> parameters(PlaneFilterParams& params);
 struct PlaneEstimate
 {
   EuclideanHomography motion;      ///< X_cur = R X_ref + t of the last camera, averaged
-  bool normal_known = false;       ///< else a plane that faces the reference camera is taken
+  bool normal_known = false;       ///< if not, the plane is assumed to face the reference camera
   bool ambiguous = false;          ///< another decomposition is as likely
   std::optional<double> distance;  ///< d, of the plane from the reference camera [m]; empty until it is known
 };
 
 /**
- * Averages what the homographies of a moving camera say (thesis 8.5), with its odometry. The normal is the same in the
- * reference frame whatever the camera does; once it is known, each homography tells its motion by it, also where the views
- * nearly agree and a decomposition would say nothing. Rotations and translations of the last part of the way are moved
- * into the last camera by odometry, where rotations are averaged by orthogonal Procrustes. d follows from how much the
- * translation over d changes for how far odometry says the camera has moved, t2/d - dR t1/d = dt/d: in least squares for
- * 1/d, as the image's part of it is noisier than odometry's, which would make d too small the other way round.
+ * Averages the planes and motions of a moving camera's homographies (thesis 8.5), with its odometry. The plane's normal
+ * in the reference frame does not depend on the camera. Once it is known, each homography and the normal give a motion,
+ * also where the views nearly agree and a decomposition would give nothing.
  *
- * Where a homography has two decompositions, both are followed by their normals. The true one stays where it is in the
- * reference frame, the other wanders as the camera moves: when it has scattered clearly more, or cannot be seen any more,
- * it is dropped for good. Until then the estimate says that it is ambiguous.
+ * Averaged are the motions of those last measurements at which the camera was within `window` of where it is now:
+ * odometry moves them into the last camera's frame, where the mean rotation follows from orthogonal Procrustes. The
+ * distance d is known once two places of measurements are `window` apart. It follows from how much t/d changes when
+ * odometry says that the camera has moved by dt: t2/d - dR t1/d = dt/d, in least squares for 1/d. Solved for d it would
+ * come out too small, because the left side is noisier than odometry's dt.
+ *
+ * Where a homography has two decompositions, the filter follows both by their normals. The true normal stays the same
+ * in the reference frame; the other one wanders as the camera moves. A decomposition whose normals scatter clearly
+ * more, or that is not seen any more, is dropped for good. Until then the estimate is marked as ambiguous.
  */
 class PlaneFilter
 {
@@ -59,9 +62,9 @@ public:
 
   /**
    * A homography that shows the plane from behind changes nothing.
-   * @param camera_in_odom pose of the camera in a frame that does not jump; empty without odometry: then nothing but the
+   * @param camera_in_odom pose of the camera in a frame that does not jump; empty without odometry, and then only the
    * normal is averaged.
-   * @param h, k, seen as of decomposeHomography().
+   * @param h, k, seen as in decomposeHomography().
    */
   void add(const std::optional<Eigen::Isometry3d>& camera_in_odom, const Eigen::Matrix3d& h, const Eigen::Matrix3d& k,
            const Points& seen);

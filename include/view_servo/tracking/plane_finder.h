@@ -3,8 +3,8 @@
 #pragma once
 
 #include "view_servo/geometry/correspondence.h"
-#include "view_servo/views/prepared_image.h"
 #include "view_servo/views/point_view_matcher.h"
+#include "view_servo/views/prepared_image.h"
 
 #include <Eigen/Core>
 #include <opencv2/core/mat.hpp>
@@ -17,9 +17,9 @@
 namespace view_servo
 {
 /**
- * Finds the plane of a stored view in an image, from nothing, by matching points. A view that the image shows twice is not
- * found, because nobody knows which of the two is meant, unless one of them is where the view was seen last. Stateless and
- * safe to use from several threads.
+ * Finds the plane of a stored view in an image by matching points, without a prediction. A view that the image shows
+ * twice is not found, as it is not known which of the two is meant, unless one of them is where the view was seen last.
+ * Stateless and safe to use from several threads.
  */
 class PlaneFinder
 {

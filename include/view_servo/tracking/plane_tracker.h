@@ -22,7 +22,7 @@ struct PlaneTrackerParams
 {
   HomographyAlignerParams tracker;
   PlaneFilterParams filter;
-  int lost_after = 5;  ///< images in a row without the plane, >= 1
+  int lost_after = 5;  ///< the plane is lost after this many images in a row without it, >= 1
 
   /** All faults, one a line; empty when the parameters are usable. */
   std::vector<std::string> validate() const;
@@ -35,7 +35,7 @@ enum class TrackingState
 {
   SEARCHING,  ///< not found in this image
   TRACKING,   ///< found
-  LOST        ///< was found before, and has not been for `lost_after` images
+  LOST        ///< it was found before, but not in the last `lost_after` images
 };
 
 /** What is known after an image. */
@@ -47,13 +47,13 @@ struct PlaneTrack
 };
 
 /**
- * Follows the plane of a stored view through the images of a moving camera (thesis ch. 8). Each homography is predicted by
- * odometry from the last one that was found, ΔH = K (ΔR + Δt nᵀ / d) K⁻¹ with the plane in the frame of that last camera,
- * looked for against the stored view, and gives the filter of plane and motion its next measurement. Until d is known
- * only the turn is predicted; without odometry, that nothing has moved.
+ * Follows the plane of a stored view through the images of a moving camera (thesis ch. 8). Each homography is predicted
+ * by odometry from the last one that was found, ΔH = K (ΔR + Δt nᵀ / d) K⁻¹ with the plane in the frame of that last
+ * camera, aligned with the stored view, and added to the filter of plane and motion. Until d is known only the rotation
+ * is predicted; without odometry the last homography is the prediction.
  *
- * A plane that is hidden is looked for on and on where odometry says it is. When that is in vain for too long, somebody has
- * to find it anew: start().
+ * The search for a hidden plane goes on where odometry predicts it. When that fails for too long, the plane has to be
+ * found by other means: start().
  */
 class PlaneTracker
 {
@@ -66,16 +66,16 @@ public:
                const PlaneTrackerParams& params);
 
   /**
-   * Where the plane was found by other means, in an image no older than the last one added as long as that showed it: then
-   * nothing changes, since tracking knows better.
+   * Sets where the plane was found by other means. While the plane is tracked nothing changes, as tracking is more
+   * accurate.
    * @param h x_cur ~ H x_ref [px]. @param camera_in_odom of that image.
    */
   void start(const Eigen::Matrix3d& h, const std::optional<Eigen::Isometry3d>& camera_in_odom);
 
   /**
    * The next image.
-   * @param image 8-bit, one channel. @param camera_in_odom pose of the camera at that time in a frame that does not jump,
-   * empty where odometry does not know.
+   * @param image 8-bit, one channel. @param camera_in_odom pose of the camera at that time in a frame that does not
+   * jump, empty where odometry does not know.
    * @throws std::invalid_argument when the image has the wrong type.
    */
   const PlaneTrack& add(const cv::Mat& image, const std::optional<Eigen::Isometry3d>& camera_in_odom);

@@ -22,12 +22,12 @@ struct ViewTrackerParams
   int max_landmarks = 200;    ///< points of the stored view that are tracked, >= 8
   int window = 21;            ///< side of the patches [px], odd, >= 5
   int levels = 2;             ///< of the pyramid besides the image, >= 0
-  double max_residual = 2.0;  ///< of a point that supports the pose [px], > 0
-  int min_supporting = 15;    ///< points that make a pose, >= 4
-  double min_support = 0.35;  ///< part of the points looked for that makes one, (0, 1]
+  double max_residual = 2.0;  ///< largest one of a point that supports the pose [px], > 0
+  int min_supporting = 15;    ///< least number of points that support a pose, >= 4
+  double min_support = 0.35;  ///< least part of the points looked for that support it, (0, 1]
   double max_scale_difference =
-      0.35;                    ///< between a point's change of size and the typical one; others are left out, > 0
-  double assumed_depth = 2.5;  ///< of points when nothing is known [m], > 0
+      0.35;                    ///< points whose change of size differs more from the typical one are left out, > 0
+  double assumed_depth = 2.5;  ///< of points while nothing is known of it [m], > 0
 
   /** All faults, one a line; empty when the parameters are usable. */
   std::vector<std::string> validate() const;
@@ -39,9 +39,9 @@ std::vector<Parameter> parameters(ViewTrackerParams& params);
 /**
  * Follows the stored view from a camera that moves on the floor, in image space: points of the stored view, whose depth
  * is known from two views but for one common scale, are found in each image where the last pose and odometry predict
- * them (Lucas & Kanade, in an image normalised against light), and the pose is what explains their positions. Points are
- * always compared with the stored view itself, so nothing drifts; and where the view is reached all displacements are
- * zero, whatever the depths, so that the pose ends exact although the epipole says nothing there (thesis 5.4).
+ * them (Lucas & Kanade, in an image normalised against light), and the pose that explains their positions is fitted.
+ * Points are always compared with the stored view itself, so nothing drifts. At the view all displacements are zero
+ * whatever the depths, so that the pose becomes exact there although the epipole is undetermined (thesis 5.4).
  *
  * Poses are those of the stored view's level camera in the current one. Their unit of length is that of the pose that
  * the structure came from.
@@ -83,15 +83,17 @@ public:
     bool found = false;
     PlanarPose pose;            ///< valid when found
     int looked_for = 0;         ///< landmarks predicted to be in the image
-    int supporting = 0;         ///< landmarks found where the pose explains it
+    int supporting = 0;         ///< landmarks found where the pose puts them
     double rms = 0.0;           ///< of these [px]
     double displacement = 0.0;  ///< median distance between where these are and where the stored view has them [px]
   };
 
-  /** Finds the landmarks in an image. @param predicted pose expected. @throws std::invalid_argument for another size. */
+  /**
+   * Finds the landmarks in an image. @param predicted pose expected. @throws std::invalid_argument for another size.
+   */
   Result track(const cv::Mat& current, const PlanarPose& predicted) const;
 
-  /** The pose from matches with landmarks, without prediction. */
+  /** The pose from matches (level points) of landmarks, without a prediction. */
   Result locate(const Correspondences& matches) const;
 
 private:
@@ -106,7 +108,7 @@ private:
   Eigen::Vector2d levelOf(const Eigen::Vector2d& pixel) const;
   bool insideReference(const Eigen::Vector2d& pixel) const;
   const Point* nearest(const Eigen::Vector2d& level_point) const;
-  /** The pose that most of them agree with, to that residual [px]. */
+  /** The pose that most sightings agree with to within a residual [px]. */
   Result fit(const std::vector<Sighting>& sightings, double max_residual) const;
 
   Camera camera_;
