@@ -17,8 +17,8 @@ struct ArmKinematicsParams
 {
   std::string base_link = "base_link";
   std::string camera_frame = "camera_optical_frame";  ///< x right, y down, z forward (REP 103)
-  double damping = 0.05;                              ///< of the inverse at a singularity, >= 0
-  double min_manipulability = 0.02;  ///< smallest singular value of the Jacobian that needs no damping, > 0
+  double damping = 0.05;                              ///< of the inverse at a singularity
+  double min_manipulability = 0.02;                   ///< smallest singular value of the Jacobian that needs no damping
 
   /** All faults, one a line; empty when the parameters are usable. */
   std::vector<std::string> validate() const;

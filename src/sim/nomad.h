@@ -18,14 +18,14 @@ namespace view_servo::sim
 /** Options of the simulated base. */
 struct NomadParams
 {
-  double max_speed = 0.5;              ///< [m/s], > 0
-  double max_turn_rate = 1.0;          ///< [rad/s], > 0
-  double max_acceleration = 1.0;       ///< [m/s²], > 0
-  double max_turn_acceleration = 2.0;  ///< [rad/s²], > 0
-  double radius = 0.26;                ///< of its round outline on the floor [m], > 0
-  double odometry_drift = 0.0;         ///< by which part it measures distances too long, > -1
+  double max_speed = 0.5;              ///< [m/s]
+  double max_turn_rate = 1.0;          ///< [rad/s]
+  double max_acceleration = 1.0;       ///< [m/s²]
+  double max_turn_acceleration = 2.0;  ///< [rad/s²]
+  double radius = 0.26;                ///< of its round outline on the floor [m]
+  double odometry_drift = 0.0;         ///< by which part it measures distances too long
   double odometry_turn_drift = 0.0;    ///< turn that it measures and that does not happen [rad/m]
-  double odometry_noise = 0.0;         ///< standard deviation of measured motion, as a part of it, >= 0
+  double odometry_noise = 0.0;         ///< standard deviation of measured motion, as a part of it
   std::uint64_t seed = 1;              ///< of odometry's noise
 
   /** All faults, one a line; empty when the parameters are usable. */

@@ -19,10 +19,10 @@ namespace view_servo::sim
 /** Options of the simulated arm. */
 struct PumaParams : ArmKinematicsParams
 {
-  double max_joint_acceleration = 4.0;      ///< [rad/s²], > 0
-  double encoder_noise = 0.0;               ///< standard deviation of each reading [rad], >= 0
-  double hand_eye_translation_error = 0.0;  ///< how far the true camera is from where the URDF has it [m], >= 0
-  double hand_eye_rotation_error = 0.0;     ///< by what angle it is turned against the URDF [rad], in [0, π]
+  double max_joint_acceleration = 4.0;      ///< [rad/s²]
+  double encoder_noise = 0.0;               ///< standard deviation of each reading [rad]
+  double hand_eye_translation_error = 0.0;  ///< how far the true camera is from where the URDF has it [m]
+  double hand_eye_rotation_error = 0.0;     ///< by what angle it is turned against the URDF [rad]
   std::uint64_t seed = 1;                   ///< of the encoders' noise, and of the hand-eye error's directions
 
   /** All faults, one a line; empty when the parameters are usable. */

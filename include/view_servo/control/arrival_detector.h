@@ -24,10 +24,10 @@ double gradientSimilarity(const cv::Mat& reference, const cv::Mat& current);
 /** Options of the arrival detector. */
 struct ArrivalDetectorParams
 {
-  double rise = 1.0;       ///< standard deviations of the similarities before, which a sudden rise exceeds, > 0
-  double min_rise = 0.08;  ///< a sudden rise exceeds this as well, > 0
-  double drop = 0.1;    ///< the view was passed when this part of the gain over the mean before is lost again, (0, 1)
-  int min_history = 5;  ///< similarities that must be known before a rise counts, >= 2
+  double rise = 1.0;       ///< standard deviations of the similarities before, which a sudden rise exceeds
+  double min_rise = 0.08;  ///< a sudden rise exceeds this as well
+  double drop = 0.1;       ///< the view was passed when this part of the gain over the mean before is lost again
+  int min_history = 5;     ///< similarities that must be known before a rise counts
 
   /** All faults, one a line; empty when the parameters are usable. */
   std::vector<std::string> validate() const;

@@ -26,12 +26,12 @@ enum class CameraMotion
 struct HeadingHypothesesParams
 {
   CameraMotion motion = CameraMotion::PLANAR;
-  double inlier_threshold = 3.0;  ///< largest error of a match that supports one [px], > 0
-  double max_yaw = 0.6;           ///< largest turn between the views that is looked for [rad], (0, pi/2)
-  double min_significance = 6.0;  ///< of a new one: -log10 of the number of false alarms to be expected, >= 0
-  double memory = 0.7;            ///< part of its weight that one keeps from one set of matches to the next, [0, 1)
-  int max_hypotheses = 5;         ///< those of most weight are kept, >= 1
-  double assumed_distance = 1.0;  ///< distance of the view until it is known [m], > 0
+  double inlier_threshold = 3.0;  ///< largest error of a match that supports one [px]
+  double max_yaw = 0.6;           ///< largest turn between the views that is looked for [rad]
+  double min_significance = 6.0;  ///< of a new one: -log10 of the number of false alarms to be expected
+  double memory = 0.7;            ///< part of its weight that one keeps from one set of matches to the next
+  int max_hypotheses = 5;         ///< those of most weight are kept
+  double assumed_distance = 1.0;  ///< distance of the view until it is known [m]
   std::uint64_t seed = 1;
 
   /** All faults, one a line; empty when the parameters are usable. */

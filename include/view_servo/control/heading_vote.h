@@ -22,12 +22,12 @@ struct HeadingEvidence
 /** Options of the heading vote. */
 struct HeadingVoteParams
 {
-  int bins = 181;           ///< of the histogram over [-pi/2, pi/2], >= 3
-  double margin = 0.17;     ///< K: headings closer than this to +-pi/2 are too uncertain to be chosen [rad], [0, pi/2)
-  double smoothing = 0.02;  ///< standard deviation of the Gaussian over which a vote is spread [rad], >= 0
-  double narrowing = 0.7;   ///< factor of the region's width when the highest peak of all is inside, (0, 1]
-  double widening = 1.3;    ///< factor of the region's width when it is outside, >= 1
-  double min_half_width = 0.1;  ///< of the region [rad], > 0
+  int bins = 181;               ///< of the histogram of headings
+  double margin = 0.17;         ///< K: headings closer than this to +-pi/2 are too uncertain to be chosen [rad]
+  double smoothing = 0.02;      ///< standard deviation of the Gaussian over which a vote is spread [rad]
+  double narrowing = 0.7;       ///< factor of the region's width when the highest peak of all is inside
+  double widening = 1.3;        ///< factor of the region's width when it is outside
+  double min_half_width = 0.1;  ///< of the region [rad]
 
   /** All faults, one a line; empty when the parameters are usable. */
   std::vector<std::string> validate() const;

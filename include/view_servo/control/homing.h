@@ -38,24 +38,24 @@ struct HomingParams
   HeadingHypothesesParams hypotheses;
   ArrivalDetectorParams arrival;
   ViewTrackerParams tracker;
-  double lost_timeout = 10.0;  ///< homing gives up after this time without a sign of the view [s], > 0
+  double lost_timeout = 10.0;  ///< homing gives up after this time without a sign of the view [s]
 
   // Mode SERVO.
-  double gain = 1.0;                   ///< speed per distance of the view [1/s], > 0
-  double turn_gain = 1.0;              ///< turn rate per yaw error [1/s], > 0
-  double blind_speed = 0.1;            ///< speed while only the heading is known [m/s], > 0
-  double distance_tolerance = 0.002;   ///< distance from the view at which the base has arrived [m], > 0
-  double yaw_tolerance = 0.002;        ///< yaw error at which it has arrived [rad], > 0
-  double dwell = 0.5;                  ///< time that the base has to stay within both tolerances [s], >= 0
-  double arrival_distance = 0.01;      ///< within it the view counts as reached, though the base still drives [m], > 0
-  double arrival_yaw = 0.0175;         ///< likewise, of the yaw error [rad], > 0
-  double docking_displacement = 40.0;  ///< homing docks below this median displacement of the view's points [px], > 0
-  double min_similarity = 0.3;         ///< homing ends only where gradientSimilarity() is at least this, [-1, 1)
+  double gain = 1.0;                   ///< speed per distance of the view [1/s]
+  double turn_gain = 1.0;              ///< turn rate per yaw error [1/s]
+  double blind_speed = 0.1;            ///< speed while only the heading is known [m/s]
+  double distance_tolerance = 0.002;   ///< distance from the view at which the base has arrived [m]
+  double yaw_tolerance = 0.002;        ///< yaw error at which it has arrived [rad]
+  double dwell = 0.5;                  ///< time that the base has to stay within both tolerances [s]
+  double arrival_distance = 0.01;      ///< within it the view counts as reached, though the base still drives [m]
+  double arrival_yaw = 0.0175;         ///< likewise, of the yaw error [rad]
+  double docking_displacement = 40.0;  ///< homing docks below this median displacement of the view's points [px]
+  double min_similarity = 0.3;         ///< homing ends only where gradientSimilarity() is at least this
 
   // Mode THESIS.
-  double step = 0.02;        ///< length of a step, after which the heading is found anew [m], > 0
-  double near_step = 0.01;   ///< the same after the rise of the correlation [m], > 0
-  double step_speed = 0.08;  ///< [m/s], > 0
+  double step = 0.02;        ///< length of a step, after which the heading is found anew [m]
+  double near_step = 0.01;   ///< the same after the rise of the correlation [m]
+  double step_speed = 0.08;  ///< [m/s]
 
   /** All faults, one a line; empty when the parameters are usable. */
   std::vector<std::string> validate() const;

@@ -21,15 +21,15 @@ namespace view_servo
 /** Options of 2.5D servoing. */
 struct Servo25dParams
 {
-  double gain = 1.0;       ///< rate at which a large error decays [1/s], > 0
-  double near_gain = 2.5;  ///< rate at which a small error decays [1/s], >= gain
-  double margin = 0.1;     ///< part of the image at each border that the chosen point stays out of, [0, 0.3]
-  double distance = 0.5;   ///< d: distance of the plane from the stored view, until it is known [m], > 0
-  double translation_tolerance = 0.001;  ///< error of the camera's position at which it has converged [m], > 0
-  double rotation_tolerance = 0.0015;    ///< error of its rotation at which it has converged [rad], > 0
-  double dwell = 0.5;                    ///< time that it has to stay within both tolerances [s], >= 0
-  double loss_tolerance = 0.12;  ///< time without the view that sent commands bridge; then it stands [s], [0, 0.5]
-  double lost_timeout = 5.0;     ///< servoing gives up after this time without the view [s], > 0
+  double gain = 1.0;                     ///< rate at which a large error decays [1/s]
+  double near_gain = 2.5;                ///< rate at which a small error decays [1/s]
+  double margin = 0.1;                   ///< part of the image at each border that the chosen point stays out of
+  double distance = 0.5;                 ///< d: distance of the plane from the stored view, until it is known [m]
+  double translation_tolerance = 0.001;  ///< error of the camera's position at which it has converged [m]
+  double rotation_tolerance = 0.0015;    ///< error of its rotation at which it has converged [rad]
+  double dwell = 0.5;                    ///< time that it has to stay within both tolerances [s]
+  double loss_tolerance = 0.12;          ///< time without the view that sent commands bridge; then it stands [s]
+  double lost_timeout = 5.0;             ///< servoing gives up after this time without the view [s]
 
   /** All faults, one a line; empty when the parameters are usable. */
   std::vector<std::string> validate() const;

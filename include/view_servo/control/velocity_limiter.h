@@ -21,10 +21,10 @@ using Twist = Eigen::Matrix<double, 6, 1>;
 /** Limits of the motion of a base or a camera. */
 struct VelocityLimits
 {
-  double max_speed = 0.25;             ///< [m/s], > 0
-  double max_turn_rate = 0.4;          ///< [rad/s], > 0
-  double max_acceleration = 0.5;       ///< [m/s²], > 0
-  double max_turn_acceleration = 1.0;  ///< [rad/s²], > 0
+  double max_speed = 0.25;             ///< [m/s]
+  double max_turn_rate = 0.4;          ///< [rad/s]
+  double max_acceleration = 0.5;       ///< [m/s²]
+  double max_turn_acceleration = 1.0;  ///< [rad/s²]
 
   /** All faults, one a line; empty when the parameters are usable. */
   std::vector<std::string> validate() const;

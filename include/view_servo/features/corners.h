@@ -15,13 +15,13 @@ namespace view_servo
 /** Options of the Harris detector (thesis 2.7; eq. 2.20-2.24). */
 struct CornerParams
 {
-  int max_corners = 500;            ///< the strongest are kept, >= 1
-  double derivative_sigma = 0.7;    ///< Gaussian derivative scale [px], > 0
-  double integration_sigma = 1.4;   ///< Gaussian window of the second-moment matrix [px], > 0
-  double k = 0.04;                  ///< in R = det(M) - k tr(M)², [0, 0.25)
-  double min_distance = 2.0;        ///< no two corners closer than this [px], >= 0
-  double relative_threshold = 0.0;  ///< smallest response as a fraction of the strongest, [0, 1)
-  int border = 4;                   ///< no corners closer than this to the image's border [px], >= 1
+  int max_corners = 500;            ///< the strongest are kept
+  double derivative_sigma = 0.7;    ///< Gaussian derivative scale [px]
+  double integration_sigma = 1.4;   ///< Gaussian window of the second-moment matrix [px]
+  double k = 0.04;                  ///< in R = det(M) - k tr(M)²
+  double min_distance = 2.0;        ///< no two corners closer than this [px]
+  double relative_threshold = 0.0;  ///< smallest response as a fraction of the strongest
+  int border = 4;                   ///< no corners closer than this to the image's border [px]
 
   /** All faults, one a line; empty when the parameters are usable. */
   std::vector<std::string> validate() const;

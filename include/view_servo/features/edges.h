@@ -15,10 +15,10 @@ namespace view_servo
 /** Options of the edge detector (thesis 2.8.1; Canny 1986). */
 struct EdgeParams
 {
-  double sigma = 1.0;           ///< Gaussian derivative scale [px], [0.6, 20]
-  double low_threshold = 2.0;   ///< least gradient of every pixel of a chain [grey levels/px], > 0
-  double high_threshold = 4.0;  ///< least gradient of one pixel of a chain [grey levels/px], >= low_threshold
-  int min_points = 5;           ///< shorter chains are dropped, >= 2
+  double sigma = 1.0;           ///< Gaussian derivative scale [px]
+  double low_threshold = 2.0;   ///< least gradient of every pixel of a chain [grey levels/px]
+  double high_threshold = 4.0;  ///< least gradient of one pixel of a chain [grey levels/px]
+  int min_points = 5;           ///< shorter chains are dropped
 
   /** All faults, one a line; empty when the parameters are usable. */
   std::vector<std::string> validate() const;

@@ -28,11 +28,11 @@ struct LineSegmentParams
   double sigma = 1.0;              ///< scale of the edges [px], [0.6, 20]: about 1 for fine, 2 for coarse ones
   double low_threshold = 2.0;      ///< CANNY: see EdgeParams [grey levels/px]
   double high_threshold = 4.0;     ///< CANNY: see EdgeParams [grey levels/px]
-  double min_deviation = 0.6;      ///< CANNY: smaller deviations from a straight line are noise [px], > 0
-  double max_deviation = 0.8;      ///< CANNY: no segment deviates more from its edge [px], >= min_deviation
-  double min_significance = 20.0;  ///< CANNY: least length over greatest deviation, >= 0
-  double min_length = 15.0;        ///< [px], (0, 10000]
-  int max_segments = 1000;         ///< the longest are kept, >= 1
+  double min_deviation = 0.6;      ///< CANNY: smaller deviations from a straight line are noise [px]
+  double max_deviation = 0.8;      ///< CANNY: no segment deviates more from its edge [px]
+  double min_significance = 20.0;  ///< CANNY: least length over greatest deviation
+  double min_length = 15.0;        ///< [px]
+  int max_segments = 1000;         ///< the longest are kept
 
   /** All faults, one a line; empty when the parameters are usable. */
   std::vector<std::string> validate() const;

@@ -23,9 +23,9 @@ enum class PairSelection
 struct ProfileParams
 {
   PairSelection selection = PairSelection::NEAREST;
-  int neighbours = 50;        ///< K_c: pairs a corner starts (NEAREST), >= 1
-  double max_length = 200.0;  ///< D_c: longest profile (RADIUS) [px], > min_length
-  double min_length = 10.0;   ///< shortest profile [px], >= 2
+  int neighbours = 50;        ///< K_c: pairs a corner starts (NEAREST)
+  double max_length = 200.0;  ///< D_c: longest profile (RADIUS) [px]
+  double min_length = 10.0;   ///< shortest profile [px]
   int coefficients = 8;       ///< N_f: 4, 6 or 8 Fourier features a profile
   double min_contrast = 6.0;  ///< profiles that differ less than this from their mean are left out [grey levels]
 

@@ -17,8 +17,8 @@ namespace view_servo
 /** Options of the search for more matches that agree with a geometry. */
 struct GuidedParams
 {
-  int patch_radius = 6;          ///< patches of (2 r + 1)² pixels are compared [px], 1 to 50
-  double min_correlation = 0.6;  ///< least one of the current patch with the warped reference patch, [0, 1)
+  int patch_radius = 6;          ///< patches of (2 r + 1)² pixels are compared [px]
+  double min_correlation = 0.6;  ///< least one of the current patch with the warped reference patch
 
   /** All faults, one a line; empty when the parameters are usable. */
   std::vector<std::string> validate() const;

@@ -22,9 +22,9 @@ namespace view_servo
 struct LineFeatureParams
 {
   LineGroupParams groups;
-  int max_grouped = 400;     ///< this many of the longest segments form groups and seeds; regions grow over all, >= 1
-  int neighbours = 40;       ///< nearest segments of each, by which a hypothesis is judged, >= 6
-  int neighbour_pairs = 15;  ///< nearest segments of each that form a hypothesis with it, >= 2
+  int max_grouped = 400;     ///< this many of the longest segments form groups and seeds; regions grow over all
+  int neighbours = 40;       ///< nearest segments of each, by which a hypothesis is judged
+  int neighbour_pairs = 15;  ///< nearest segments of each that form a hypothesis with it
 
   /** All faults, one a line; empty when the parameters are usable. */
   std::vector<std::string> validate() const;

@@ -40,11 +40,11 @@ struct LineGroupParams
 {
   LineGrouping groups = LineGrouping::TRIPLETS;
   LineOrder order = LineOrder::CONTRAST;
-  double max_distance = 100.0;  ///< from each segment of a pair to the intersection of their lines [px], > 0
-  double collinearity = 2.0;    ///< a point this close to a segment's line counts as on it [px], >= 0
-  double min_angle_deg = 15.0;  ///< between the lines of a pair, (0, 90)
+  double max_distance = 100.0;  ///< from each segment of a pair to the intersection of their lines [px]
+  double collinearity = 2.0;    ///< a point this close to a segment's line counts as on it [px]
+  double min_angle_deg = 15.0;  ///< between the lines of a pair
   int max_neighbours = 15;      ///< pairs that a segment forms, the closest; 0 = no limit
-  double min_weight = 0.1;      ///< structures less likely than this are left out, [0, 1)
+  double min_weight = 0.1;      ///< structures less likely than this are left out
 
   /** All faults, one a line; empty when the parameters are usable. */
   std::vector<std::string> validate() const;

@@ -22,16 +22,16 @@ namespace view_servo
 /** Options of finding regions. */
 struct LineRegionParams
 {
-  int max_candidates = 8;         ///< counterparts tried for a segment, those of most votes, >= 1
-  int max_trials = 600;           ///< candidates tried in all, beginning with those that stand out most, >= 1
-  int max_companions = 12;        ///< matches of neighbours tried with a candidate, those of most votes, >= 2
-  int max_hypotheses = 3;         ///< affine maps scored for a candidate, those whose three segments agree best, >= 1
-  double affine_tolerance = 3.0;  ///< distance across of segments that agree with a local affine map [px], > 0
-  double tolerance = 2.0;         ///< distance across of segments that agree with a homography [px], > 0
-  double max_angle_deg = 10.0;    ///< between a segment and its counterpart, (0, 45)
-  double min_support = 5.0;       ///< of a region: sum over its matches of 0.3 + 0.7 share, > 0
-  double min_correlation = 0.55;  ///< least sideCorrelation() of a match, [-1, 1)
-  double min_mean_correlation = 0.6;  ///< least mean of a region's matches, [-1, 1)
+  int max_candidates = 8;             ///< counterparts tried for a segment, those of most votes
+  int max_trials = 600;               ///< candidates tried in all, beginning with those that stand out most
+  int max_companions = 12;            ///< matches of neighbours tried with a candidate, those of most votes
+  int max_hypotheses = 3;             ///< affine maps scored for a candidate, those whose three segments agree best
+  double affine_tolerance = 3.0;      ///< distance across of segments that agree with a local affine map [px]
+  double tolerance = 2.0;             ///< distance across of segments that agree with a homography [px]
+  double max_angle_deg = 10.0;        ///< between a segment and its counterpart
+  double min_support = 5.0;           ///< of a region: sum over its matches of 0.3 + 0.7 share
+  double min_correlation = 0.55;      ///< least sideCorrelation() of a match
+  double min_mean_correlation = 0.6;  ///< least mean of a region's matches
 
   /** All faults, one a line; empty when the parameters are usable. */
   std::vector<std::string> validate() const;

@@ -22,9 +22,9 @@ struct ProfileSearchParams
 {
   ProfileSearch search = ProfileSearch::NEAREST;
   int neighbours = 12;   ///< K_v (NEAREST), >= 1; the thesis has 25, which finds 2 % more and takes 1.6 times as long
-  double radius = 0.5;   ///< D_v (RADIUS) [standard deviations of a feature], > 0
-  double epsilon = 3.0;  ///< a missed neighbour is at most (1 + epsilon) times nearer than those found (NEAREST), >= 0
-  double share = 1.0;    ///< part of the current profiles that are searched for: those of the largest features, (0, 1]
+  double radius = 0.5;   ///< D_v (RADIUS) [standard deviations of a feature]
+  double epsilon = 3.0;  ///< a missed neighbour is at most (1 + epsilon) times nearer than those found (NEAREST)
+  double share = 1.0;    ///< part of the current profiles that are searched for: those of the largest features
 
   /** All faults, one a line; empty when the parameters are usable. */
   std::vector<std::string> validate() const;

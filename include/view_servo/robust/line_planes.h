@@ -21,9 +21,9 @@ namespace view_servo
 
 struct LinePlaneParams
 {
-  double threshold = 2.0;  ///< largest distance of a plane's lines, across, in either image [px], > 0
-  int min_lines = 8;       ///< lines that make a plane, >= 5
-  int max_planes = 4;      ///< planes looked for, >= 1
+  double threshold = 2.0;  ///< largest distance of a plane's lines, across, in either image [px]
+  int min_lines = 8;       ///< lines that make a plane
+  int max_planes = 4;      ///< planes looked for
 
   /** All faults, one a line; empty when the parameters are usable. */
   std::vector<std::string> validate() const;

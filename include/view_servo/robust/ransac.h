@@ -16,11 +16,11 @@ namespace view_servo
 /** Options of the one RANSAC loop. */
 struct RansacParams
 {
-  double inlier_threshold = 3.0;   ///< largest error of an inlier [px], > 0
-  double confidence = 0.999;       ///< wanted probability that an outlier-free sample was drawn, (0, 1)
-  int min_iterations = 100;        ///< samples solved before the adaptive stop (thesis eq. 9.5) may end it, >= 0
-  int max_iterations = 2000;       ///< random samples solved at most, >= 1
-  int max_rejected = 50000;        ///< samples the estimator's cheap test may refuse in all (one more ends it), >= 0
+  double inlier_threshold = 3.0;   ///< largest error of an inlier [px]
+  double confidence = 0.999;       ///< wanted probability that an outlier-free sample was drawn
+  int min_iterations = 100;        ///< samples solved before the adaptive stop (thesis eq. 9.5) may end it
+  int max_iterations = 2000;       ///< random samples solved at most
+  int max_rejected = 50000;        ///< samples the estimator's cheap test may refuse in all (one more ends it)
   int local_optimizations = 10;    ///< refits to the inliers of a new best model (Chum, Matas & Kittler 2003), 0 = off
   bool improvement_stage = false;  ///< thesis 9.4: replace each datum of the best sample by others in turn
   Sampling sampling = Sampling::PROGRESSIVE;

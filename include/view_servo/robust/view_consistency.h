@@ -21,9 +21,9 @@ double viewConstraint(const std::array<Correspondence, 5>& five);
 
 struct ViewConsistencyParams
 {
-  double threshold = 0.03;         ///< a group of five is consistent below this violation, (0, 1]
-  double mean_increments = 100.0;  ///< stop when the candidates were counted this often on average, > 0
-  int max_groups = 200000;         ///< groups drawn at most, >= 1
+  double threshold = 0.03;         ///< a group of five is consistent below this violation
+  double mean_increments = 100.0;  ///< stop when the candidates were counted this often on average
+  int max_groups = 200000;         ///< groups drawn at most
 
   /** All faults, one a line; empty when the parameters are usable. */
   std::vector<std::string> validate() const;

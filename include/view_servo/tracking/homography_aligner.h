@@ -19,13 +19,13 @@ namespace view_servo
 /** Options of the homography tracker. */
 struct HomographyAlignerParams
 {
-  int max_points = 200;          ///< corners of the stored view that are looked for, >= 12
-  int patch_radius = 10;         ///< patches of (2 r + 1)² pixels are compared; on coarse levels smaller ones, 2 to 20
-  int levels = 4;                ///< of the pyramids, the image included; more of them catch faster motion, 1 to 6
-  double min_correlation = 0.7;  ///< least one of a patch that is found again, [0, 1)
-  double max_residual = 2.0;     ///< largest one of a point that supports the homography [px], > 0
-  int min_supporting = 15;       ///< least number of points that support a homography, >= 5
-  double min_support = 0.25;     ///< least part of the points in sight that support it, (0, 1]
+  int max_points = 200;          ///< corners of the stored view that are looked for
+  int patch_radius = 10;         ///< patches of (2 r + 1)² pixels are compared; on coarse levels smaller ones
+  int levels = 4;                ///< of the pyramids, the image included; more of them catch faster motion
+  double min_correlation = 0.7;  ///< least one of a patch that is found again
+  double max_residual = 2.0;     ///< largest one of a point that supports the homography [px]
+  int min_supporting = 15;       ///< least number of points that support a homography
+  double min_support = 0.25;     ///< least part of the points in sight that support it
   bool refine = true;            ///< whether all pixels of the region refine the result
 
   /** All faults, one a line; empty when the parameters are usable. */

@@ -19,9 +19,9 @@ namespace view_servo
 /** Options of the filter of planes and motions. */
 struct PlaneFilterParams
 {
-  double window = 0.1;        ///< distance that averaged camera positions may span, and that d needs [m], > 0
-  int max_measurements = 60;  ///< most that are averaged, >= 2
-  double decision = 4.0;      ///< times that a decomposition's normals scatter more than the other's to be dropped, > 1
+  double window = 0.1;        ///< distance that averaged camera positions may span, and that d needs [m]
+  int max_measurements = 60;  ///< most that are averaged
+  double decision = 4.0;      ///< times that a decomposition's normals scatter more than the other's to be dropped
 
   /** All faults, one a line; empty when the parameters are usable. */
   std::vector<std::string> validate() const;

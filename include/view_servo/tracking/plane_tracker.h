@@ -22,7 +22,7 @@ struct PlaneTrackerParams
 {
   HomographyAlignerParams tracker;
   PlaneFilterParams filter;
-  int lost_after = 5;  ///< the plane is lost after this many images in a row without it, >= 1
+  int lost_after = 5;  ///< the plane is lost after this many images in a row without it
 
   /** All faults, one a line; empty when the parameters are usable. */
   std::vector<std::string> validate() const;

@@ -19,15 +19,14 @@ namespace view_servo
 /** Options of the view tracker. */
 struct ViewTrackerParams
 {
-  int max_landmarks = 200;    ///< points of the stored view that are tracked, >= 8
-  int window = 21;            ///< side of the patches [px], odd, >= 5
-  int levels = 2;             ///< of the pyramid besides the image, >= 0
-  double max_residual = 2.0;  ///< largest one of a point that supports the pose [px], > 0
-  int min_supporting = 15;    ///< least number of points that support a pose, >= 4
-  double min_support = 0.35;  ///< least part of the points looked for that support it, (0, 1]
-  double max_scale_difference =
-      0.35;                    ///< points whose change of size differs more from the typical one are left out, > 0
-  double assumed_depth = 2.5;  ///< of points while nothing is known of it [m], > 0
+  int max_landmarks = 200;             ///< points of the stored view that are tracked
+  int window = 21;                     ///< side of the patches [px]
+  int levels = 2;                      ///< of the pyramid besides the image
+  double max_residual = 2.0;           ///< largest one of a point that supports the pose [px]
+  int min_supporting = 15;             ///< least number of points that support a pose
+  double min_support = 0.35;           ///< least part of the points looked for that support it
+  double max_scale_difference = 0.35;  ///< points whose change of size differs more from the typical one are left out
+  double assumed_depth = 2.5;          ///< of points while nothing is known of it [m]
 
   /** All faults, one a line; empty when the parameters are usable. */
   std::vector<std::string> validate() const;

@@ -25,7 +25,7 @@ struct LineMatcherParams
   LineRegionParams regions;
   RansacParams ransac;  ///< for points and lines; the inlier threshold is that of points [px]
   LinePlaneParams planes;
-  double min_quality = 0.5;  ///< least MatchedLine::score of a match, [0, 1)
+  double min_quality = 0.5;  ///< least MatchedLine::score of a match
   std::uint64_t seed = 1;
 
   LineMatcherParams();

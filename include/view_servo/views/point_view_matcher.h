@@ -50,7 +50,7 @@ struct PointViewMatcherParams
    */
   double first_share = 0.6;
   bool scale_search = true;  ///< try other scale ratios and coarser scales when the full images give no geometry
-  double min_log_significance = 6.0;  ///< least ViewMatch::log_significance of a geometry that is accepted, >= 0
+  double min_log_significance = 6.0;  ///< least ViewMatch::log_significance of a geometry that is accepted
   std::uint64_t seed = 1;
 
   /** All faults, one a line; empty when the parameters are usable. */
