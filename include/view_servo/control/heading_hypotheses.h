@@ -30,7 +30,7 @@ struct HeadingHypothesesParams
   double max_yaw = 0.6;           ///< largest turn between the views that is looked for [rad]
   double min_significance = 6.0;  ///< of a new one: -log10 of the number of false alarms to be expected
   double memory = 0.7;            ///< part of its weight that one keeps from one set of matches to the next
-  int max_hypotheses = 5;         ///< those of most weight are kept
+  int max_hypotheses = 5;         ///< hypotheses kept at most, those of most weight
   double assumed_distance = 1.0;  ///< distance of the view until it is known [m]
   std::uint64_t seed = 1;
 
@@ -47,7 +47,7 @@ struct HeadingHypothesis
   PlanarPose view_in_odom;    ///< of the view's level camera, whose distance from the last camera pose is a guess
   PlanarPose view_in_camera;  ///< as seen from the last camera pose, of distance 1
   double weight = 0.0;        ///< share of the matches that agree, plus memory times the weight before
-  int updates = 0;            ///< sets of matches that agreed
+  int updates = 0;            ///< sets of matches that agreed with it
   RelativePose motion;        ///< X_cur = R X_ref + t, of which view_in_camera is the part on the floor
   Correspondences support;    ///< last matches that agree
 };

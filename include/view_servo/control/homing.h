@@ -48,7 +48,7 @@ struct HomingParams
   double yaw_tolerance = 0.002;        ///< yaw error at which it has arrived [rad]
   double dwell = 0.5;                  ///< time that the base has to stay within both tolerances [s]
   double arrival_distance = 0.01;      ///< within it the view counts as reached, though the base still drives [m]
-  double arrival_yaw = 0.0175;         ///< likewise, of the yaw error [rad]
+  double arrival_yaw = 0.0175;         ///< yaw error within which the view counts as reached [rad]
   double docking_displacement = 40.0;  ///< homing docks below this median displacement of the view's points [px]
   double min_similarity = 0.3;         ///< homing ends only where gradientSimilarity() is at least this
 
@@ -89,8 +89,9 @@ struct HomingReport
   std::vector<double> histogram;
   double roi_min = std::numeric_limits<double>::quiet_NaN();  ///< where the next heading is expected [rad]
   double roi_max = std::numeric_limits<double>::quiet_NaN();
-  double similarity = std::numeric_limits<double>::quiet_NaN();    ///< gradientSimilarity(), in [-1, 1]
-  double displacement = std::numeric_limits<double>::quiet_NaN();  ///< median, of the view's points [px]
+  double similarity = std::numeric_limits<double>::quiet_NaN();  ///< gradientSimilarity(), in [-1, 1]
+  double displacement = std::numeric_limits<
+      double>::quiet_NaN();  ///< median distance of the view's points from their places in the view [px]
   int inliers = 0;
 };
 

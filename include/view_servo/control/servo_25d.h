@@ -80,9 +80,10 @@ struct ServoReport
 {
   ServoState state = ServoState::ACQUIRING;
   std::string reason = "looks for the view";                            ///< one line
-  double translation_error = std::numeric_limits<double>::quiet_NaN();  ///< of the camera [m]
-  double rotation_error = std::numeric_limits<double>::quiet_NaN();     ///< likewise [rad]
-  double point_error = std::numeric_limits<double>::quiet_NaN();        ///< of the chosen point [px]
+  double translation_error = std::numeric_limits<double>::quiet_NaN();  ///< distance of the camera from the view [m]
+  double rotation_error =
+      std::numeric_limits<double>::quiet_NaN();  ///< angle by which the camera is turned from the view [rad]
+  double point_error = std::numeric_limits<double>::quiet_NaN();  ///< distance of the chosen point from its place [px]
   std::optional<Servo25dError> error;
   Eigen::Vector2d point = Eigen::Vector2d::Constant(std::numeric_limits<double>::quiet_NaN());  ///< where it is [px]
   Eigen::Vector2d gains = Eigen::Vector2d::Ones();  ///< the adaptive ones, of x and y, in [0, 1]

@@ -18,7 +18,7 @@ struct EdgeParams
   double sigma = 1.0;           ///< Gaussian derivative scale [px]
   double low_threshold = 2.0;   ///< least gradient of every pixel of a chain [grey levels/px]
   double high_threshold = 4.0;  ///< least gradient of one pixel of a chain [grey levels/px]
-  int min_points = 5;           ///< shorter chains are dropped
+  int min_points = 5;           ///< pixels of the shortest chain that is kept
 
   /** All faults, one a line; empty when the parameters are usable. */
   std::vector<std::string> validate() const;

@@ -14,7 +14,7 @@ namespace view_servo
 struct PlanarPose
 {
   double x = 0.0;    ///< [m], or in another unit where the scale is not known
-  double y = 0.0;    ///< likewise
+  double y = 0.0;    ///< [m], or in the unit of x
   double yaw = 0.0;  ///< of B's x axis, counter-clockwise seen from above [rad], (-pi, pi]
 
   /** From A's origin to B's, in the unit of x and y. */

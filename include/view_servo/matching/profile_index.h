@@ -21,8 +21,8 @@ enum class ProfileSearch
 struct ProfileSearchParams
 {
   ProfileSearch search = ProfileSearch::NEAREST;
-  int neighbours = 12;   ///< K_v (NEAREST), >= 1; the thesis has 25, which finds 2 % more and takes 1.6 times as long
-  double radius = 0.5;   ///< D_v (RADIUS) [standard deviations of a feature]
+  int neighbours = 12;   ///< K_v (NEAREST): profiles each votes for; the thesis' 25 find 2 % more in 1.6 times the time
+  double radius = 0.5;   ///< D_v (RADIUS): distance of similar profiles [standard deviations of a feature]
   double epsilon = 3.0;  ///< a missed neighbour is at most (1 + epsilon) times nearer than those found (NEAREST)
   double share = 1.0;    ///< part of the current profiles that are searched for: those of the largest features
 

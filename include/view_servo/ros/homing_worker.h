@@ -67,7 +67,7 @@ private:
   {
     std::optional<std::shared_ptr<HomingTask>> task;      ///< to which the rest of the inbox belongs; empty: as before
     std::vector<std::pair<double, PlanarPose>> odometry;  ///< by stamp [s]
-    std::vector<std::pair<double, HeadingEvidence>> matches;  ///< likewise
+    std::vector<std::pair<double, HeadingEvidence>> matches;  ///< by stamp [s]
     std::optional<CameraFrame> frame;                         ///< the newest
     std::chrono::steady_clock::time_point frame_time;
   };

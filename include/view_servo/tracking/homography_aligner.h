@@ -23,10 +23,10 @@ struct HomographyAlignerParams
   int patch_radius = 10;         ///< patches of (2 r + 1)² pixels are compared; on coarse levels smaller ones
   int levels = 4;                ///< of the pyramids, the image included; more of them catch faster motion
   double min_correlation = 0.7;  ///< least one of a patch that is found again
-  double max_residual = 2.0;     ///< largest one of a point that supports the homography [px]
-  int min_supporting = 15;       ///< least number of points that support a homography
-  double min_support = 0.25;     ///< least part of the points in sight that support it
-  bool refine = true;            ///< whether all pixels of the region refine the result
+  double max_residual = 2.0;  ///< largest distance between where a supporting point is found and where H sends it [px]
+  int min_supporting = 15;    ///< least number of points that support a homography
+  double min_support = 0.25;  ///< least part of the points in sight that has to support the homography
+  bool refine = true;         ///< whether all pixels of the region refine the result
 
   /** All faults, one a line; empty when the parameters are usable. */
   std::vector<std::string> validate() const;

@@ -19,12 +19,13 @@ namespace view_servo
 /** Options of the view tracker. */
 struct ViewTrackerParams
 {
-  int max_landmarks = 200;             ///< points of the stored view that are tracked
-  int window = 21;                     ///< side of the patches [px]
-  int levels = 2;                      ///< of the pyramid besides the image
-  double max_residual = 2.0;           ///< largest one of a point that supports the pose [px]
+  int max_landmarks = 200;  ///< points of the stored view that are tracked
+  int window = 21;          ///< side of the patches [px]
+  int levels = 2;           ///< of the pyramid besides the image
+  double max_residual =
+      2.0;  ///< largest distance between where a supporting point is found and where the pose sends it [px]
   int min_supporting = 15;             ///< least number of points that support a pose
-  double min_support = 0.35;           ///< least part of the points looked for that support it
+  double min_support = 0.35;           ///< least part of the points looked for that has to support the pose
   double max_scale_difference = 0.35;  ///< points whose change of size differs more from the typical one are left out
   double assumed_depth = 2.5;          ///< of points while nothing is known of it [m]
 
