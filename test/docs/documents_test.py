@@ -7,7 +7,6 @@ every name in backticks has to be known to running nodes, or to the sources; C++
 headings; drawings name what the sources have.
 A command of a form that is not known here, or a name that nothing explains, is a failure: teach this test what to do.
 """
-import collections
 import functools
 import glob
 import os
@@ -214,7 +213,7 @@ class Documented(unittest.TestCase):
             self.assertTrue(set(words[1:]) <= set(re.findall(r"\w+", known.split("known:")[1])), known)
         elif words[0] == "scripts/build":
             targets = [word for word in words[1:] if not word.startswith("-D")]
-            text = self.read("CMakeLists.txt") + self.read("bench", "CMakeLists.txt")
+            text = self.read("src", "CMakeLists.txt") + self.read("bench", "CMakeLists.txt")
             for target in targets:
                 self.assertTrue(target == "tests" or "add_custom_target(%s)" % target in text, target)
         elif words[:2] == ["scripts/test", "--sanitize"]:
@@ -399,7 +398,7 @@ class Documented(unittest.TestCase):
         for path in glob.glob(os.path.join(ROOT, "src", "**", "*.*"), recursive=True) + \
                 glob.glob(os.path.join(ROOT, "include", "**", "*.h"), recursive=True):
             with open(path) as file:
-                names.update(re.findall(r"(?:read|expect)\(\"(\w+)\"", file.read()))
+                names.update(re.findall(r"\b(?:integer|real|natural|boolean|text|path|choice<\w+>)\(\s*\"(\w+)\"", file.read()))
         for path in glob.glob(os.path.join(ROOT, "config", "*.yaml")):
             with open(path) as file:
                 for key, value in yaml.safe_load(file).items():
@@ -464,7 +463,7 @@ class Documented(unittest.TestCase):
         known.update(name[:-len("/goal")] for name in list(known) if name.endswith("/goal"))
         last_parts = {name.split("/")[-1] for name in known}
         sources = "".join(self.source_files().values())
-        for path in ("CMakeLists.txt", "test/CMakeLists.txt", "package.xml", "scripts/plot_run", "test/rostest/node_test.h"):
+        for path in ("CMakeLists.txt", "src/CMakeLists.txt", "test/CMakeLists.txt", "package.xml", "scripts/plot_run", "test/rostest/node_test.h"):
             sources += self.read(path)
         words = set(re.findall(r"\w+", sources.replace("${PROJECT_NAME}", PACKAGE)))
 
@@ -473,8 +472,8 @@ class Documented(unittest.TestCase):
                 return True
             if text.startswith("~"):
                 group, _, name = text[1:].rpartition("/")
-                grouped = name in parameters and '(reader, "%s")' % group in sources
-                return text[1:] in parameters | last_parts or grouped or '(reader, "%s")' % text[1:] in sources
+                grouped = name in parameters and 'parameters(params.%s), "%s")' % (group, group) in sources
+                return text[1:] in parameters | last_parts or grouped or 'parameters(params.%s), "%s")' % (text[1:], text[1:]) in sources
             if ":=" in text:
                 return all(part.split(":=")[0] in arguments for part in text.split(" "))
             match = re.match(r"(\w+):( |$)", text)
@@ -547,17 +546,6 @@ class Documented(unittest.TestCase):
         self.assertTrue(found and node in here.get(found[0], []), "%s has no such topic %s" % (node, name))
         if full_type:
             self.assertEqual(running.topic_types()[found[0]], full_type)
-
-    def test_parameter_tables(self):
-        """docs/parameters.md has the names and the defaults of the files in config/."""
-        files = {"Points": "point_matcher", "Lines": "line_matcher", "Homing": "homing",
-                 "Homography tracker": "homography_tracker", "2.5D servoing": "servo_25d"}
-        count = collections.Counter()
-        for row in self.document("docs/parameters.md").rows:
-            with self.subTest(where=row.place, row=row.cells[0]):
-                self.assert_default(files[row.section], row.cells[0].strip("`"), row.cells[2])
-                count[row.section] += 1
-        self.assertEqual(set(count), set(files))
 
     def test_parameters_of_nodes(self):
         """Where docs/nodes.md gives a default, it is that of the files in config/."""
