@@ -6,7 +6,6 @@
 #include "view_servo/ros/conversions.h"
 #include "view_servo/ros/image_source.h"
 #include "view_servo/ros/node_base.h"
-#include "view_servo/tracking/plane_tracker_parameters.h"
 #include "view_servo/views/view_store.h"
 
 #include <ros/console.h>
