@@ -4,6 +4,7 @@
 
 #include "sim/renderer.h"
 #include "sim/world_reader.h"
+#include "support/corner_error.h"
 #include "support/textured_plane.h"
 #include "view_servo/geometry/homography.h"
 #include "test_paths.h"
