@@ -2,7 +2,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // Runs the program itself, as a shell would.
 #include "support/temporary_directory.h"
-#include "support/corner_error.h"
 #include "support/textured_plane.h"
 #include "test_paths.h"
 
