@@ -1,6 +1,7 @@
 // Copyright (c) 2026, the view_servo authors
 // SPDX-License-Identifier: BSD-3-Clause
 // Runs the program itself, as a shell would.
+#include "support/corner_error.h"
 #include "support/temporary_directory.h"
 #include "support/textured_plane.h"
 #include "test_paths.h"
