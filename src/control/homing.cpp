@@ -436,7 +436,9 @@ std::vector<Parameter> rowsOfHoming(HomingParams& params)
 {
   return {
     choice<HomingMode>("mode", params.mode, { { "servo", HomingMode::SERVO }, { "thesis", HomingMode::THESIS } },
-                       "how to home"),
+                       "how to home: by all that this package knows, or as printed in chapter 5 of the thesis: without "
+                       "rotation, straight to a "
+                       "goal ahead, in steps, until the correlation of the gradients has risen and drops again"),
     real("lost_timeout", params.lost_timeout, "s", "> 0", "time without a trace of the view, after which it gives up"),
     real("gain", params.gain, "1/s", "> 0", "speed per distance"),
     real("turn_gain", params.turn_gain, "1/s", "> 0", "turn rate per yaw error"),

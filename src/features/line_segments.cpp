@@ -278,9 +278,9 @@ bool lsdAvailable()
 std::vector<Parameter> parameters(LineSegmentParams& params)
 {
   return joined(
-      { { choice<SegmentDetector>("detector", params.detector,
-                                  { { "canny", SegmentDetector::CANNY }, { "lsd", SegmentDetector::LSD } },
-                                  "subdivided edges, or OpenCV's Line Segment Detector") },
+      { { choice<SegmentDetector>(
+            "detector", params.detector, { { "canny", SegmentDetector::CANNY }, { "lsd", SegmentDetector::LSD } },
+            "subdivided edges, or OpenCV's Line Segment Detector, which its versions 4.1.0 to 4.5.3 do not have") },
         edgeParameters(params.sigma, params.low_threshold, params.high_threshold),
         {
             real("segment_deviation", params.min_deviation, "px", "> 0",

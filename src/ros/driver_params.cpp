@@ -33,11 +33,13 @@ std::vector<Parameter> rowsOfHomingDriver(HomingDriverParams& params)
 std::vector<Parameter> parameters(DriverParams& params)
 {
   return {
-    boolean("dry_run", params.dry_run, "do everything but move: commands are zero"),
+    boolean("dry_run", params.dry_run, "publish commands on cmd_vel_dry instead of cmd_vel, whether enabled or not"),
     real("timeout", params.timeout, "s", "> 0", "time limit of a goal that brings none"),
     real("control_rate", params.control_rate, "Hz", "[10, 1000]", "rate of commands"),
     real("start_patience", params.start_patience, "s", "> 0",
-         "how long a goal waits for what it needs before it begins"),
+         "how long a goal waits, before it begins, for what it needs: images, their calibration, tf, an answer of a "
+         "matcher or "
+         "tracker, and somebody who listens to the commands"),
   };
 }
 

@@ -404,7 +404,7 @@ class Documented(unittest.TestCase):
                 for key, value in yaml.safe_load(file).items():
                     names.add(key)
                     names.update(value if isinstance(value, dict) else [])
-        for row in self.document("docs/parameters.md").rows:
+        for row in self.document("docs/parameters.md").rows + self.document("docs/parameters_of_drivers.md").rows:
             names.update(re.findall(r"\w+", row.cells[1]))  # values that words stand for
         return names
 

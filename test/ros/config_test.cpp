@@ -2,7 +2,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 
 /** @file
- * The files in config/ and the tables in docs/parameters.md say what the tables of parameters in the sources say: names,
+ * The files in config/ and the tables in docs/parameters*.md say what the tables of parameters in the sources say: names,
  * types, defaults, units, ranges and meanings. VIEW_SERVO_UPDATE=1 writes them anew.
  */
 #include "test_paths.h"
@@ -64,16 +64,20 @@ public:
     };
   }
 
-  /** Headings and tables of docs/parameters.md. */
-  Sections documented()
+  /** Headings and tables of the files in docs/. */
+  std::vector<std::pair<std::string, Sections>> documented()
   {
-    return { { "## Matchers", parameters(points_node) },
-             { "## Points", parameters(points) },
-             { "## Lines", parameters(lines) },
-             { "# Homing", parameters(homing) },
-             { "# Homography tracker", parameters(tracker) },
-             { "# 2.5D servoing", parameters(servo) },
-             { "# View store", parameters(store) } };
+    return {
+      { "parameters",
+        { { "## Matchers", parameters(points_node) },
+          { "## Points", parameters(points) },
+          { "## Lines", parameters(lines) } } },
+      { "parameters_of_drivers",
+        { { "## Homing", parameters(homing) },
+          { "## Homography tracker", parameters(tracker) },
+          { "## 2.5D servoing", parameters(servo) },
+          { "## View store", parameters(store) } } },
+    };
   }
 };
 
@@ -106,7 +110,7 @@ std::string yamlOf(const std::string& node, const Tables::Sections& sections)
 {
   std::string text = commented("Parameters of the node " + node +
                                ", at their defaults. Above each stands what it means, [its unit] and its range. "
-                               "docs/parameters.md says which to turn.");
+                               "docs/parameters.md and docs/parameters_of_drivers.md say which to turn.");
   for (const auto& [title, table] : sections)
   {
     text += "\n# --- " + title + "\n";
@@ -188,32 +192,38 @@ TEST(Config, FilesHoldTheDefaults)
 TEST(Config, DocumentedTablesAreThoseOfTheSources)
 {
   Tables tables;
-  const std::string file = PACKAGE_DIR "/docs/parameters.md";
-  std::string text = read(file);
-  for (const auto& [heading, table] : tables.documented())
+  for (const auto& [document, sections] : tables.documented())
   {
-    const std::size_t section = text.find("\n" + heading + "\n");
-    ASSERT_NE(section, std::string::npos) << heading;
-    const std::size_t begin = text.find("\n| name |", section) + 1;
-    ASSERT_NE(begin, 0U) << heading;
-    const std::size_t end = text.find("\n\n", begin);
-    text.replace(begin, (end == std::string::npos ? text.size() : end + 1) - begin, rowsOf(table));
+    const std::string file = PACKAGE_DIR "/docs/" + document + ".md";
+    std::string text = read(file);
+    for (const auto& [heading, table] : sections)
+    {
+      const std::size_t section = text.find("\n" + heading + "\n");
+      ASSERT_NE(section, std::string::npos) << heading;
+      const std::size_t begin = text.find("\n| name |", section) + 1;
+      ASSERT_NE(begin, 0U) << heading;
+      const std::size_t end = text.find("\n\n", begin);
+      text.replace(begin, (end == std::string::npos ? text.size() : end + 1) - begin, rowsOf(table));
+    }
+    expectText(file, text);
   }
-  expectText(file, text);
 }
 
 TEST(Config, DefaultsAreValidAndNamesUnique)
 {
   Tables tables;
-  for (const auto& [heading, table] : tables.documented())
+  for (const auto& [document, sections] : tables.documented())
   {
-    SCOPED_TRACE(heading);
-    EXPECT_EQ(faultsOf(table), std::vector<std::string>());
-    std::set<std::string> names;
-    for (const Parameter& parameter : table)
+    for (const auto& [heading, table] : sections)
     {
-      EXPECT_TRUE(names.insert(parameter.name).second) << parameter.name;
-      EXPECT_FALSE(parameter.description.empty()) << parameter.name;
+      SCOPED_TRACE(heading);
+      EXPECT_EQ(faultsOf(table), std::vector<std::string>());
+      std::set<std::string> names;
+      for (const Parameter& parameter : table)
+      {
+        EXPECT_TRUE(names.insert(parameter.name).second) << parameter.name;
+        EXPECT_FALSE(parameter.description.empty()) << parameter.name;
+      }
     }
   }
   EXPECT_EQ(tables.points_node.validate(), std::vector<std::string>());
