@@ -22,9 +22,9 @@
  * of the corners of the region of interest, against a registration of each frame with frame 0.
  */
 #include "view_servo/geometry/homography.h"
+#include "view_servo/images/image_io.h"
 #include "view_servo/robust/random.h"
 #include "view_servo/tracking/homography_aligner.h"
-#include "view_servo/images/image_io.h"
 
 #include "sim/textures.h"
 

@@ -35,7 +35,7 @@ function(link_visp target)
 endfunction()
 
 # vs_executable(NAME FILES file... LIBS library...): a program `NAME` by the target view_servo_NAME, as targets of all packages
-# of a workspace share their names.
+# of a workspace share their names. It is installed.
 function(vs_executable name)
   cmake_parse_arguments(ARG "" "" "FILES;LIBS" ${ARGN})
   set(target ${PROJECT_NAME}_${name})
@@ -44,4 +44,5 @@ function(vs_executable name)
   configure_target(${target})
   target_include_directories(${target} PRIVATE ${PROJECT_SOURCE_DIR}/src)
   target_link_libraries(${target} PRIVATE ${ARG_LIBS})
+  install(TARGETS ${target} RUNTIME DESTINATION ${CATKIN_PACKAGE_BIN_DESTINATION})
 endfunction()

@@ -40,10 +40,15 @@ Eigen::Matrix<double, N, 1> solveSymmetric(const Eigen::Matrix<double, N, N>& a,
   return a.ldlt().solve(b);
 }
 
-extern template Eigen::Matrix<double, 2, 1> solveSymmetric(const Eigen::Matrix<double, 2, 2>&, const Eigen::Matrix<double, 2, 1>&);
-extern template Eigen::Matrix<double, 3, 1> solveSymmetric(const Eigen::Matrix<double, 3, 3>&, const Eigen::Matrix<double, 3, 1>&);
-extern template Eigen::Matrix<double, 5, 1> solveSymmetric(const Eigen::Matrix<double, 5, 5>&, const Eigen::Matrix<double, 5, 1>&);
-extern template Eigen::Matrix<double, 7, 1> solveSymmetric(const Eigen::Matrix<double, 7, 7>&, const Eigen::Matrix<double, 7, 1>&);
-extern template Eigen::Matrix<double, 9, 1> solveSymmetric(const Eigen::Matrix<double, 9, 9>&, const Eigen::Matrix<double, 9, 1>&);
+extern template Eigen::Matrix<double, 2, 1> solveSymmetric(const Eigen::Matrix<double, 2, 2>&,
+                                                           const Eigen::Matrix<double, 2, 1>&);
+extern template Eigen::Matrix<double, 3, 1> solveSymmetric(const Eigen::Matrix<double, 3, 3>&,
+                                                           const Eigen::Matrix<double, 3, 1>&);
+extern template Eigen::Matrix<double, 5, 1> solveSymmetric(const Eigen::Matrix<double, 5, 5>&,
+                                                           const Eigen::Matrix<double, 5, 1>&);
+extern template Eigen::Matrix<double, 7, 1> solveSymmetric(const Eigen::Matrix<double, 7, 7>&,
+                                                           const Eigen::Matrix<double, 7, 1>&);
+extern template Eigen::Matrix<double, 9, 1> solveSymmetric(const Eigen::Matrix<double, 9, 9>&,
+                                                           const Eigen::Matrix<double, 9, 1>&);
 
 }  // namespace view_servo

@@ -8,13 +8,13 @@
 #include "support/recorded_bag.h"
 #include "support/temporary_directory.h"
 
+#include "test_paths.h"
 #include "view_servo/Homography.h"
 #include "view_servo/ServoError.h"
 #include "view_servo/ServoToViewAction.h"
 #include "view_servo/control/servo_25d.h"
 #include "view_servo/control/velocity_limiter.h"
 #include "view_servo/views/view_store.h"
-#include "test_paths.h"
 
 #include <actionlib/client/simple_action_client.h>
 #include <geometry_msgs/TwistStamped.h>

@@ -6,12 +6,12 @@
 #include "support/recorded_bag.h"
 #include "support/temporary_directory.h"
 
+#include "test_paths.h"
 #include "view_servo/LineMatches.h"
 #include "view_servo/PointMatches.h"
 #include "view_servo/SetView.h"
 #include "view_servo/geometry/homography.h"
 #include "view_servo/views/view_store.h"
-#include "test_paths.h"
 
 #include <geometry_msgs/PoseStamped.h>
 #include <gtest/gtest.h>
@@ -280,9 +280,8 @@ protected:
 TEST_P(ShippedRunTest, EachImageIsAnsweredTrulyOrRefused)
 {
   const std::string bag = directory_->path() / (std::string(GetParam().world) + "_" + GetParam().trajectory + ".bag");
-  const std::string command = "'" RECORD_BAG_PATH "' '" PACKAGE_DIR "/config/worlds/" +
-                              std::string(GetParam().world) + ".yaml' " + GetParam().trajectory + " '" + bag +
-                              "' --rate 1";
+  const std::string command = "'" RECORD_BAG_PATH "' '" PACKAGE_DIR "/config/worlds/" + std::string(GetParam().world) +
+                              ".yaml' " + GetParam().trajectory + " '" + bag + "' --rate 1";
   ASSERT_EQ(std::system(command.c_str()), 0) << command;
   const std::vector<Frame> frames = framesOf(bag);
   StoredView last;

@@ -2,18 +2,18 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "child_process.h"
 #include "node_test.h"
-#include "sim_ros/robot_messages.h"
-#include "sim/world_reader.h"
 #include "sim/nomad.h"
 #include "sim/renderer.h"
+#include "sim/world_reader.h"
+#include "sim_ros/robot_messages.h"
 #include "support/recorded_bag.h"
 #include "support/temporary_directory.h"
 
+#include "test_paths.h"
 #include "view_servo/Heading.h"
 #include "view_servo/SetView.h"
 #include "view_servo/geometry/planar_pose.h"
 #include "view_servo/views/view_store.h"
-#include "test_paths.h"
 
 #include <gtest/gtest.h>
 

@@ -1,11 +1,12 @@
 // Copyright (c) 2026, the view_servo authors
 // SPDX-License-Identifier: BSD-3-Clause
 #include "driver_cases.h"
-#include "sim_ros/robot_messages.h"
 #include "sim/nomad.h"
 #include "sim/renderer.h"
 #include "sim/world_reader.h"
+#include "sim_ros/robot_messages.h"
 
+#include "test_paths.h"
 #include "view_servo/Heading.h"
 #include "view_servo/HomeToViewAction.h"
 #include "view_servo/LineMatches.h"
@@ -13,7 +14,6 @@
 #include "view_servo/geometry/planar_pose.h"
 #include "view_servo/views/point_view_matcher.h"
 #include "view_servo/views/view_store.h"
-#include "test_paths.h"
 
 #include <geometry_msgs/Twist.h>
 #include <tf2_ros/static_transform_broadcaster.h>

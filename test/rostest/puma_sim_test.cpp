@@ -2,8 +2,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "node_test.h"
 #include "sim_ros/robot_messages.h"
-#include "view_servo/SetPose.h"
 #include "test_paths.h"
+#include "view_servo/SetPose.h"
 
 #include <geometry_msgs/PoseStamped.h>
 #include <geometry_msgs/TwistStamped.h>

@@ -1,12 +1,12 @@
 // Copyright (c) 2026, the view_servo authors
 // SPDX-License-Identifier: BSD-3-Clause
 // Runs the program itself, as a shell would, and reads what it wrote.
-#include "sim_ros/robot_messages.h"
 #include "sim/puma.h"
 #include "sim/world_reader.h"
+#include "sim_ros/robot_messages.h"
 #include "support/temporary_directory.h"
-#include "view_servo/ros/conversions.h"
 #include "test_paths.h"
+#include "view_servo/ros/conversions.h"
 
 #include <gtest/gtest.h>
 #include <rosbag/bag.h>

@@ -6,8 +6,8 @@
 #include "sim/world_reader.h"
 #include "support/corner_error.h"
 #include "support/textured_plane.h"
-#include "view_servo/geometry/homography.h"
 #include "test_paths.h"
+#include "view_servo/geometry/homography.h"
 
 #include <gtest/gtest.h>
 #include <Eigen/Geometry>

@@ -6,8 +6,8 @@
 #include "sim/visibility.h"
 #include "sim/world_reader.h"
 #include "support/textured_plane.h"
-#include "view_servo/robust/random.h"
 #include "test_paths.h"
+#include "view_servo/robust/random.h"
 
 #include <gtest/gtest.h>
 #include <opencv2/core.hpp>

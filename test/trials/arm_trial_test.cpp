@@ -3,8 +3,8 @@
 #include "trials/arm_trial.h"
 #include "sim/world_reader.h"
 
-#include "view_servo/geometry/homography.h"
 #include "test_paths.h"
+#include "view_servo/geometry/homography.h"
 
 #include <gtest/gtest.h>
 #include <Eigen/Geometry>

@@ -4,8 +4,8 @@
 #include "sim/world_reader.h"
 
 #include "sim/visibility.h"
-#include "view_servo/robust/random.h"
 #include "test_paths.h"
+#include "view_servo/robust/random.h"
 
 #include <gtest/gtest.h>
 
