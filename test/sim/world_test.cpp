@@ -1,146 +1,21 @@
 // Copyright (c) 2026, the view_servo authors
 // SPDX-License-Identifier: BSD-3-Clause
-#include "sim/world_reader.h"
+#include "sim/world.h"
 
-#include "sim/nomad.h"
-#include "sim/renderer.h"
 #include "sim/textures.h"
-#include "support/temporary_directory.h"
+#include "sim/world_reader.h"
 #include "test_paths.h"
 
 #include <gtest/gtest.h>
 #include <opencv2/core.hpp>
-#include <opencv2/imgproc.hpp>
 
 #include <cmath>
-#include <filesystem>
-#include <fstream>
 #include <stdexcept>
 #include <string>
 #include <vector>
 
 namespace view_servo::sim
 {
-namespace
-{
-namespace fs = std::filesystem;
-
-std::vector<std::string> worldFiles()
-{
-  std::vector<std::string> files;
-  for (const auto& entry : fs::directory_iterator(PACKAGE_DIR "/config/worlds"))
-  {
-    if (entry.path().extension() == ".yaml")
-    {
-      files.push_back(entry.path().string());
-    }
-  }
-  return files;
-}
-
-/** Part of the image that shows edges: a world that is nearly bare is of no use. */
-double structure(const cv::Mat& image)
-{
-  cv::Mat edges;
-  cv::Canny(image, edges, 40.0, 100.0);
-  return static_cast<double>(cv::countNonZero(edges)) / static_cast<double>(image.total());
-}
-
-const char* const SMALL_WORLD =
-    "robot: {kind: nomad, camera_height: 1.0}\n"
-    "camera: {fx: 500}\n"
-    "textures:\n"
-    "  grey: {kind: plain}\n"
-    "boxes:\n"
-    "  - {name: post, size: [0.2, 0.2, 1], position: [1, 0, 0], texture: grey}\n"
-    "goal: {x: 0, y: 0}\n";
-
-/** What reading a world says that differs from the small one in one place. */
-std::string faultOf(const std::string& from, const std::string& to)
-{
-  const test::TemporaryDirectory directory;
-  std::string text = SMALL_WORLD;
-  const std::size_t at = text.find(from);
-  EXPECT_NE(at, std::string::npos) << from;
-  text.replace(at, from.size(), to);
-  const std::string file = (directory.path() / "world.yaml").string();
-  std::ofstream(file) << text;
-  try
-  {
-    readWorld(file);
-  }
-  catch (const std::invalid_argument& error)
-  {
-    return error.what();
-  }
-  return "";
-}
-
-}  // namespace
-
-class ShippedWorld : public testing::TestWithParam<std::string>
-{
-};
-
-TEST_P(ShippedWorld, CanBeSeenFromItsGoalAndStarts)
-{
-  const World world = readWorld(GetParam());
-  EXPECT_EQ(world.name, fs::path(GetParam()).stem().string());
-  SimulatedCamera camera(world, {}, 1);
-  std::vector<Eigen::Isometry3d> poses = { world.goal };
-  for (const auto& [name, pose] : world.starts)
-  {
-    poses.push_back(pose);
-  }
-  EXPECT_GE(world.starts.size(), 3U);
-  EXPECT_FALSE(world.trajectories.empty());
-  for (const Eigen::Isometry3d& pose : poses)
-  {
-    const bool nomad = world.robot == RobotKind::NOMAD;
-    if (nomad)
-    {
-      NomadParams params;
-      EXPECT_NO_THROW(Nomad(world, params).setPose(pose));
-    }
-    const cv::Mat image = camera.capture(nomad ? Eigen::Isometry3d(pose * world.camera_on_base) : pose);
-    EXPECT_EQ(image.size(), cv::Size(world.camera.width, world.camera.height));
-    EXPECT_GT(structure(image), 0.02) << world.name;
-  }
-}
-
-INSTANTIATE_TEST_SUITE_P(Config, ShippedWorld, testing::ValuesIn(worldFiles()),
-                         [](const testing::TestParamInfo<std::string>& file) {
-                           return fs::path(file.param).stem().string();
-                         });
-
-TEST(World, FaultsNameFileAndLine)
-{
-  EXPECT_EQ(faultOf("fx: 500", "fx: 500"), "");
-  const auto expectFault = [](const std::string& from, const std::string& to, const std::string& line,
-                              const std::string& what) {
-    const std::string fault = faultOf(from, to);
-    EXPECT_NE(fault.find("world.yaml: line " + line), std::string::npos) << fault;
-    EXPECT_NE(fault.find(what), std::string::npos) << fault;
-  };
-  expectFault("kind: nomad", "kind: tank", "1", "unknown kind of robot 'tank'");
-  expectFault("camera_height: 1.0", "camera_height: -1.0", "1", "camera_height must be positive");
-  expectFault("fx: 500", "fxx: 500", "2", "unknown key 'fxx'");
-  expectFault("fx: 500", "fx: .nan", "2", "fx must be finite");
-  expectFault("fx: 500", "width: 640.5", "2", "whole numbers");
-  expectFault("fx: 500", "supersampling: 9", "2", "supersampling must lie in [1, 4]");
-  expectFault("kind: plain", "kind: marble", "4", "unknown kind of picture 'marble'");
-  expectFault("kind: plain", "file: nowhere.png", "4", "nowhere.png");
-  expectFault("[0.2, 0.2, 1]", "[0.2, 0.2]", "6", "size must be a list of 3 numbers");
-  expectFault("[0.2, 0.2, 1]", "[0.2, 0, 1]", "6", "sides must be positive");
-  expectFault("texture: grey}", "texture: green}", "6", "there is no texture 'green'");
-  expectFault("texture: grey}", "texture: grey, copies: {count: 0, step: [1, 0, 0]}}", "6", "count");
-  expectFault("{x: 0, y: 0}", "{x: 0}", "7", "needs 'y'");
-  expectFault("goal:", "gaol:", "7", "unknown key 'gaol'");
-  EXPECT_NE(faultOf("goal: {x: 0, y: 0}\n", "").find("needs 'goal'"), std::string::npos);
-  EXPECT_NE(faultOf("kind: nomad, ", "kind: [nomad, ").find("world.yaml"), std::string::npos);
-  EXPECT_THROW(readWorld("/nowhere/world.yaml"), std::invalid_argument);
-}
-
 TEST(World, NamesTheStartsThereAre)
 {
   const World world = readWorld(PACKAGE_DIR "/config/worlds/desk.yaml");
@@ -191,6 +66,21 @@ TEST(World, TrajectoriesAreInterpolated)
   EXPECT_TRUE(poseAt(trajectory, 2.0).isApprox(planarPose(1.0, 0.5, 0.5)));
   EXPECT_TRUE(poseAt(trajectory, 3.0).isApprox(planarPose(2.0, 1.0, 1.0)));
   EXPECT_TRUE(poseAt(trajectory, 9.0).isApprox(planarPose(2.0, 1.0, 1.0)));
+}
+
+TEST(World, NoiseAndFocalLengthsCanBeOthers)
+{
+  const World world = readWorld(PACKAGE_DIR "/config/worlds/desk.yaml");
+  EXPECT_EQ(withImageNoise(world, 7.0).quality.noise, 7.0);
+  EXPECT_EQ(withImageNoise(world, 0.0).quality.noise, 0.0);
+  EXPECT_EQ(withImageNoise(world, -1.0).quality.noise, world.quality.noise);
+  const Camera camera = withFocalLengthError(world.camera, 0.1);
+  for (const int i : { 0, 1 })
+  {
+    EXPECT_DOUBLE_EQ(camera.k(i, i), 1.1 * world.camera.k(i, i));
+    EXPECT_DOUBLE_EQ(camera.projection(i, i), 1.1 * world.camera.projection(i, i));
+    EXPECT_EQ(camera.k(i, 2), world.camera.k(i, 2));
+  }
 }
 
 TEST(Textures, AreTheSameForTheSameSeed)
