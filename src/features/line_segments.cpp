@@ -299,7 +299,7 @@ std::vector<std::string> LineSegmentParams::validate() const
   std::vector<std::string> faults = faultsOf(*this);
   if (detector == SegmentDetector::LSD && !LSD_AVAILABLE)
   {
-    faults.emplace_back("OpenCV " CV_VERSION " has no Line Segment Detector");
+    faults.emplace_back("detector must be canny, as OpenCV " CV_VERSION " has no Line Segment Detector");
   }
   return faults;
 }

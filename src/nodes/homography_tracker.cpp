@@ -50,6 +50,7 @@ HomographyTrackerNodeParams readTrackerParams(const ros::NodeHandle& private_nh)
   reader.read(parameters(params));
   reader.read(parameters(params.matching), "matching");
   reader.addFaults(params.validate());
+  reader.addFaults(params.matching.validate(), "matching");
   reader.finish();
   return params;
 }

@@ -44,7 +44,6 @@ std::vector<std::string> HomographyTrackerNodeParams::validate() const
   Faults faults;
   faults.add(faultsOf(*this));
   faults.add(viewFaults(view));
-  faults.add(matching.validate());
   return faults.list();
 }
 

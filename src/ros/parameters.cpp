@@ -97,9 +97,12 @@ void ParameterReader::read(const std::vector<Parameter>& table, const std::strin
   }
 }
 
-void ParameterReader::addFaults(const std::vector<std::string>& faults)
+void ParameterReader::addFaults(const std::vector<std::string>& faults, const std::string& ns)
 {
-  faults_.insert(faults_.end(), faults.begin(), faults.end());
+  for (const std::string& fault : faults)
+  {
+    faults_.push_back("~" + (ns.empty() ? "" : ns + "/") + fault);
+  }
 }
 
 void ParameterReader::expect(const std::string& name)

@@ -34,7 +34,7 @@ struct HomographyTrackerNodeParams
   SessionStarterParams sessions;
   std::string view;
   double match_period = 0.3;        // [s]
-  PointViewMatcherParams matching;  // in the sub-namespace `matching`
+  PointViewMatcherParams matching;  // in the sub-namespace `matching`, read and validated by themselves
 
   /** All faults, one a line; empty when the parameters are usable. */
   std::vector<std::string> validate() const;

@@ -30,7 +30,8 @@ public:
   /** The same for parameters in a sub-namespace: `~ns/name`. */
   void read(const std::vector<Parameter>& table, const std::string& ns);
 
-  void addFaults(const std::vector<std::string>& faults);
+  /** Faults, each of which begins with a parameter's name. @param ns the sub-namespace that it is in; empty: none. */
+  void addFaults(const std::vector<std::string>& faults, const std::string& ns = "");
 
   /**
    * Logs all values, and warns of parameters that nobody reads, naming the nearest that exists.
