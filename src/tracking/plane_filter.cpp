@@ -16,7 +16,7 @@ namespace view_servo
 std::vector<Parameter> parameters(PlaneFilterParams& params)
 {
   return {
-    real("window", params.window, "m", "> 0", "length of the camera's path over which measurements are averaged"),
+    real("window", params.window, "m", "> 0", "distance that the camera's positions of averaged measurements may span"),
     integer("max_measurements", params.max_measurements, "", ">= 2", "measurements averaged at most"),
     real("decision", params.decision, "", "> 1", "factor by which the wrong plane's normal must scatter more"),
   };

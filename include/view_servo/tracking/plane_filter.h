@@ -19,8 +19,7 @@ namespace view_servo
 /** Options of the filter of planes and motions. */
 struct PlaneFilterParams
 {
-  double window =
-      0.1;  ///< length of the camera's path that is averaged over; d is estimated only after so long a path [m]
+  double window = 0.1;        ///< distance that averaged camera positions may span, and that d needs [m]
   int max_measurements = 60;  ///< most that are averaged
   double decision = 4.0;      ///< times that a decomposition's normals scatter more than the other's to be dropped
 
