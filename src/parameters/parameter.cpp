@@ -242,7 +242,9 @@ std::vector<std::string> faultsOf(const std::vector<Parameter>& table)
     {
       const bool interval = parameter.range[0] == '[' || parameter.range[0] == '(';
       const std::string verb = interval ? " must lie in " : " must be ";
-      faults.push_back(parameter.name + verb + parameter.range + unit + ", not " + parameter.get());
+      std::string fault = parameter.name;
+      fault.append(verb).append(parameter.range).append(unit).append(", not ").append(parameter.get());
+      faults.push_back(fault);
     }
   }
   return faults;
