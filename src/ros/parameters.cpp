@@ -99,9 +99,10 @@ void ParameterReader::read(const std::vector<Parameter>& table, const std::strin
 
 void ParameterReader::addFaults(const std::vector<std::string>& faults, const std::string& ns)
 {
+  const std::string prefix = ns.empty() ? "~" : "~" + ns + "/";
   for (const std::string& fault : faults)
   {
-    faults_.push_back("~" + (ns.empty() ? "" : ns + "/") + fault);
+    faults_.push_back(prefix + fault);
   }
 }
 

@@ -82,10 +82,10 @@ public:
    * Joint angles within their limits that bring the camera to a pose, within 1e-6 m and rad. The search starts at
    * `near` and at fixed angles that are spread over the joints' ranges; of the solutions found, the nearest to `near`
    * is returned.
-   * @param pose base_link from the optical frame.
+   * @param goal base_link from the optical frame.
    * @return empty when the pose is out of reach, or its rotation is none.
    */
-  std::optional<Joints> inverse(const Eigen::Isometry3d& pose, const Joints& near) const;
+  std::optional<Joints> inverse(const Eigen::Isometry3d& goal, const Joints& near) const;
 
   /**
    * Joint velocities for a twist, by damped least squares: without damping while the smallest singular value of the
