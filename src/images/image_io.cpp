@@ -2,27 +2,29 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "view_servo/images/image_io.h"
 
+#include "view_servo/images/regular_file.h"
+
 #include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
 
 #include <algorithm>
 #include <array>
 #include <cctype>
-#include <cerrno>
-#include <filesystem>
-#include <fstream>
+#include <cstddef>
+#include <cstdlib>
 #include <optional>
-#include <system_error>
+#include <sstream>
 #include <vector>
 
 namespace view_servo
 {
 namespace
 {
-using Bytes = std::vector<unsigned char>;
-
 /** No image within the limit needs more: four channels of 16 bits, and room for comments [bytes]. */
 constexpr std::uintmax_t MAX_FILE_SIZE = 8 * MAX_IMAGE_PIXELS + 16'000'000;
+
+/** Within these bytes a header has to say the image's size, after whatever else it says. */
+constexpr std::size_t HEADER_SIZE = 4'000'000;
 
 /** What a file's header says before anything is decoded. */
 struct Header
@@ -50,17 +52,29 @@ void checkSize(const Header& size, const std::string& name)
   }
 }
 
-/** Big-endian number of COUNT bytes; 0 at the end of the file. */
+/** Big-endian number of COUNT bytes; 0 at the end of the data. */
 template <int COUNT>
-std::int64_t readNumber(std::istream& file)
+std::int64_t readNumber(std::istream& data)
 {
   std::int64_t value = 0;
   for (int i = 0; i < COUNT; ++i)
   {
-    const int byte = file.get();
+    const int byte = data.get();
     value = value * 256 + std::max(byte, 0);
   }
-  return file ? value : 0;
+  return data ? value : 0;
+}
+
+/** The same with the least significant byte first. */
+template <int COUNT>
+std::int64_t readReversedNumber(std::istream& data)
+{
+  std::int64_t value = 0;
+  for (int i = 0; i < COUNT; ++i)
+  {
+    value += static_cast<std::int64_t>(std::max(data.get(), 0)) << (8 * i);
+  }
+  return data ? value : 0;
 }
 
 /** Of a file whose signature (8 bytes) and first chunk's length and type (4 and 4) come before its size. */
@@ -118,32 +132,109 @@ std::optional<Header> readPnmHeader(std::istream& file)
   return file ? std::optional<Header>({ size[0], size[1] }) : std::nullopt;
 }
 
-/** Empty for other formats and when the header is cut short. */
-std::optional<Header> readHeader(std::istream& file)
+/** The information header, or the older core header of 12 bytes, comes after a file header of 14. */
+std::optional<Header> readBmpHeader(std::istream& file)
 {
-  std::array<char, 2> magic{};
-  file.read(magic.data(), magic.size());
-  if (magic == std::array<char, 2>{ '\x89', 'P' })
+  constexpr std::int64_t CORE_HEADER = 12;
+  file.seekg(14);
+  if (readReversedNumber<4>(file) == CORE_HEADER)
   {
-    return readPngHeader(file);
+    const std::int64_t width = readReversedNumber<2>(file);
+    const std::int64_t height = readReversedNumber<2>(file);
+    return file ? std::optional<Header>({ width, height }) : std::nullopt;
   }
-  if (magic == std::array<char, 2>{ '\xFF', '\xD8' })
+  const auto width = static_cast<std::int32_t>(readReversedNumber<4>(file));
+  const auto height = static_cast<std::int32_t>(readReversedNumber<4>(file));  // negative: from top to bottom
+  return file ? std::optional<Header>({ width, std::abs(std::int64_t{ height }) }) : std::nullopt;
+}
+
+/** The first directory has the sizes of image, tiles and strips; memory is taken by the largest of them. */
+template <bool REVERSED>
+std::optional<Header> readTiffHeader(std::istream& file)
+{
+  constexpr std::int64_t SHORT = 3;
+  constexpr std::int64_t WIDTH = 256;
+  constexpr std::int64_t HEIGHT = 257;
+  constexpr std::int64_t ROWS_PER_STRIP = 278;
+  constexpr std::int64_t TILE_WIDTH = 322;
+  constexpr std::int64_t TILE_HEIGHT = 323;
+  constexpr std::int64_t ALL_ROWS = 0xFFFFFFFF;
+  const auto two = [&] {
+    return REVERSED ? readReversedNumber<2>(file) : readNumber<2>(file);
+  };
+  const auto four = [&] {
+    return REVERSED ? readReversedNumber<4>(file) : readNumber<4>(file);
+  };
+  file.seekg(4);
+  file.seekg(four());
+  Header size{ 0, 0 };
+  Header part{ 0, 0 };
+  for (std::int64_t entries = two(); entries > 0 && file; --entries)
   {
-    return readJpegHeader(file);
+    const std::int64_t tag = two();
+    const std::int64_t type = two();
+    four();  // how many values
+    const std::int64_t value = type == SHORT ? two() : four();
+    if (type == SHORT)
+    {
+      two();
+    }
+    std::int64_t unused = 0;
+    (tag == WIDTH                                                         ? size.width
+     : tag == HEIGHT                                                      ? size.height
+     : tag == TILE_WIDTH                                                  ? part.width
+     : tag == TILE_HEIGHT || (tag == ROWS_PER_STRIP && value != ALL_ROWS) ? part.height
+                                                                          : unused) = value;
   }
-  if (magic[0] == 'P' && magic[1] >= '1' && magic[1] <= '6')
+  if (!file || size.width == 0 || size.height == 0)
   {
-    return readPnmHeader(file);
+    return std::nullopt;
+  }
+  return Header{ std::max(size.width, part.width), std::max(size.height, part.height) };
+}
+
+/** Empty for other formats, which cannot tell their size before they are decoded, and when the header is cut short. */
+std::optional<Header> readHeader(const std::string& bytes)
+{
+  std::istringstream data(bytes.substr(0, HEADER_SIZE));
+  const auto begins = [&](const std::string& magic) {
+    return bytes.compare(0, magic.size(), magic) == 0;
+  };
+  if (begins("\x89P"))
+  {
+    return readPngHeader(data);
+  }
+  if (begins("\xFF\xD8"))
+  {
+    return readJpegHeader(data);
+  }
+  if (bytes.size() > 1 && bytes[0] == 'P' && bytes[1] >= '1' && bytes[1] <= '6')
+  {
+    return readPnmHeader(data);
+  }
+  if (begins("BM"))
+  {
+    return readBmpHeader(data);
+  }
+  if (begins(std::string("II*\0", 4)))
+  {
+    data.str(bytes);  // its directory may be anywhere
+    return readTiffHeader<true>(data);
+  }
+  if (begins(std::string("MM\0*", 4)))
+  {
+    data.str(bytes);
+    return readTiffHeader<false>(data);
   }
   return std::nullopt;
 }
 
 /** A JPEG without its end mark: libjpeg fills what is missing with grey and calls it a success. */
-bool isTruncatedJpeg(const Bytes& bytes)
+bool isTruncatedJpeg(const std::string& bytes)
 {
-  constexpr std::array<unsigned char, 3> START_MARK{ 0xFF, 0xD8, 0xFF };
-  constexpr std::array<unsigned char, 2> SCAN_MARK{ 0xFF, 0xDA };
-  constexpr std::array<unsigned char, 2> END_MARK{ 0xFF, 0xD9 };
+  constexpr std::array<char, 3> START_MARK{ '\xFF', '\xD8', '\xFF' };
+  constexpr std::array<char, 2> SCAN_MARK{ '\xFF', '\xDA' };
+  constexpr std::array<char, 2> END_MARK{ '\xFF', '\xD9' };
   if (bytes.size() < START_MARK.size() || !std::equal(START_MARK.begin(), START_MARK.end(), bytes.begin()))
   {
     return false;
@@ -153,42 +244,59 @@ bool isTruncatedJpeg(const Bytes& bytes)
   return std::search(scan, bytes.end(), END_MARK.begin(), END_MARK.end()) == bytes.end();
 }
 
-Bytes readFile(const std::string& path)
+/** The levels between which nearly all pixels are. */
+struct Span
 {
-  namespace fs = std::filesystem;
-  std::error_code error;
-  const fs::file_status status = fs::status(path, error);
-  if (error)
+  int low;
+  int high;
+};
+
+/** Of the pixels of every few rows. */
+Span spanOf(const cv::Mat& grey, double outside)
+{
+  constexpr int ROWS = 200;  // looked at
+  const int every = std::max(1, grey.rows / ROWS);
+  std::vector<int> counts(std::size_t{ 1 } << 16U, 0);
+  int total = 0;
+  for (int row = 0; row < grey.rows; row += every)
   {
-    throw ImageError("cannot read " + quoted(path) + ": " + error.message());
+    for (int column = 0; column < grey.cols; ++column, ++total)
+    {
+      ++counts[grey.depth() == CV_16U ? grey.at<std::uint16_t>(row, column) : grey.at<unsigned char>(row, column)];
+    }
   }
-  if (!fs::is_regular_file(status))
+  const int few = static_cast<int>(outside * total);
+  const auto edge = [few](auto from) {
+    int passed = 0;
+    int level = 0;
+    for (; (passed += *from) <= few; ++from)
+    {
+      ++level;
+    }
+    return level;
+  };
+  return { edge(counts.begin()), static_cast<int>(counts.size()) - 1 - edge(counts.rbegin()) };
+}
+
+/** 16 bits to 8. A signal that uses a part of the range, as of 10 or 12 bits or infrared, is stretched. */
+cv::Mat reduced(const cv::Mat& grey)
+{
+  constexpr double OUTSIDE = 0.005;  // of the pixels, at each end
+  constexpr int WIDE = 26214;        // 0.4 of the range: signals this wide are left as they are
+  constexpr int NARROWEST = 64;      // what is narrower is noise
+  constexpr double MARGIN = 0.1;     // of the span, at each end: what is brighter than nearly all is still told apart
+  constexpr double WHOLE = 257.0;    // 65535 / 255
+  const Span span = spanOf(grey, OUTSIDE);
+  const int width = std::max(span.high - span.low, NARROWEST);
+  cv::Mat result;
+  if (width >= WIDE)
   {
-    throw ImageError("cannot read " + quoted(path) + ": not a file");
+    grey.convertTo(result, CV_8U, 1.0 / WHOLE);
+    return result;
   }
-  std::ifstream file(path, std::ios::binary);
-  if (!file)
-  {
-    throw ImageError("cannot read " + quoted(path) + ": " + std::generic_category().message(errno));
-  }
-  if (const std::optional<Header> header = readHeader(file))
-  {
-    checkSize(*header, path);
-  }
-  const std::uintmax_t size = fs::file_size(path, error);
-  if (error || size > MAX_FILE_SIZE)
-  {
-    throw ImageError("cannot read " + quoted(path) + ": " + (error ? error.message() : std::string("file too large")));
-  }
-  Bytes bytes(size);
-  file.clear();
-  file.seekg(0);
-  file.read(reinterpret_cast<char*>(bytes.data()), static_cast<std::streamsize>(size));
-  if (static_cast<std::uintmax_t>(file.gcount()) != size)
-  {
-    throw ImageError("cannot read " + quoted(path) + ": reading failed");
-  }
-  return bytes;
+  const double scale = 255.0 / ((1.0 + 2.0 * MARGIN) * width);
+  grey.convertTo(result, CV_8U, scale, -scale * (span.low - MARGIN * width));
+  return result;
 }
 
 }  // namespace
@@ -222,23 +330,26 @@ cv::Mat toGrey(const cv::Mat& image, const std::string& name)
   }
   if (grey.depth() == CV_16U)
   {
-    cv::Mat reduced;
-    grey.convertTo(reduced, CV_8U, 1.0 / 257.0);
-    return reduced;
+    return reduced(grey);
   }
   return grey;
 }
 
-cv::Mat readGreyImage(const std::string& path)
+cv::Mat decodeGreyImage(const std::string& bytes, const std::string& name)
 {
-  const Bytes bytes = readFile(path);
+  const std::optional<Header> header = readHeader(bytes);
   cv::Mat image;
-  if (!bytes.empty() && !isTruncatedJpeg(bytes))
+  if (header)
+  {
+    checkSize(*header, name);
+  }
+  if (header && !isTruncatedJpeg(bytes))
   {
     try
     {
       // Unchanged: features are looked for in the pixels as the camera gave them, not as a viewer would turn them.
-      image = cv::imdecode(bytes, cv::IMREAD_UNCHANGED);
+      const cv::Mat data(1, static_cast<int>(bytes.size()), CV_8U, const_cast<char*>(bytes.data()));
+      image = cv::imdecode(data, cv::IMREAD_UNCHANGED);
     }
     catch (const cv::Exception&)
     {
@@ -247,9 +358,46 @@ cv::Mat readGreyImage(const std::string& path)
   }
   if (image.empty())
   {
-    throw ImageError(quoted(path) + " is not an image, or is damaged");
+    throw ImageError(quoted(name) + " is not an image, or is damaged; PNG, JPEG, PNM, BMP and TIFF are read");
   }
-  return toGrey(image, path);
+  return toGrey(image, name);
+}
+
+cv::Mat readGreyImage(const std::string& path)
+{
+  std::optional<std::string> bytes;
+  std::string reason = "No such file or directory";
+  try
+  {
+    bytes = readRegularFile(path, MAX_FILE_SIZE);
+  }
+  catch (const std::runtime_error& error)
+  {
+    reason = error.what();
+  }
+  if (!bytes)
+  {
+    throw ImageError("cannot read " + quoted(path) + ": " + reason);
+  }
+  return decodeGreyImage(*bytes, path);
+}
+
+std::string lackOfLight(const cv::Mat& grey)
+{
+  constexpr double OUTSIDE = 0.01;  // of the pixels, at each end
+  constexpr int DARK = 20;
+  constexpr int BRIGHT = 235;
+  constexpr int EVEN = 10;
+  const Span span = spanOf(grey, OUTSIDE);
+  if (span.high < DARK)
+  {
+    return "nearly black";
+  }
+  if (span.low > BRIGHT)
+  {
+    return "nearly white";
+  }
+  return span.high - span.low < EVEN ? "nearly the same everywhere" : "";
 }
 
 }  // namespace view_servo

@@ -220,9 +220,9 @@ private:
 
   void readCamera(const YAML::Node& node)
   {
-    requireKeys(
-        node, "'camera'",
-        { "width", "height", "fx", "fy", "cx", "cy", "distortion", "rate", "noise", "exposure", "supersampling" });
+    requireKeys(node, "'camera'",
+                { "width", "height", "fx", "fy", "cx", "cy", "distortion_model", "distortion", "rate", "noise",
+                  "exposure", "supersampling" });
     Camera& camera = world_.camera;
     constexpr double MAX_SIDE = 4096.0;
     const double width = positive(node, "width", 640.0);
@@ -238,12 +238,15 @@ private:
     camera.k << fx, 0.0, numberOr(node, "cx", 0.5 * (width - 1.0)), 0.0, fy, numberOr(node, "cy", 0.5 * (height - 1.0)),
         0.0, 0.0, 1.0;
     camera.projection.leftCols<3>() = camera.k;
-    camera.distortion_model = "plumb_bob";
-    camera.distortion.assign(5, 0.0);
-    if (node["distortion"])
+    camera.distortion_model =
+        node["distortion_model"] ? convert<std::string>(node["distortion_model"], "distortion_model") : "plumb_bob";
+    constexpr std::size_t PLUMB_BOB = 5;  // coefficients
+    camera.distortion = node["distortion"] ? convert<std::vector<double>>(node["distortion"], "distortion")
+                                           : std::vector<double>(node["distortion_model"] ? 0 : PLUMB_BOB, 0.0);
+    const std::string fault = camera.fault();
+    if (!fault.empty())
     {
-      const auto values = vector<5>(node["distortion"], "distortion");
-      camera.distortion.assign(values.data(), values.data() + values.size());
+      fail(node, "the camera cannot be used: " + fault);
     }
     world_.camera_rate = positive(node, "rate", world_.camera_rate);
     world_.quality.noise = numberOr(node, "noise", 0.0);
@@ -496,6 +499,10 @@ World readWorld(const std::string& file)
   try
   {
     const std::filesystem::path path(file);
+    if (!std::filesystem::is_regular_file(path))
+    {
+      throw YAML::BadFile(file);
+    }
     World world = WorldReader(YAML::LoadFile(file), path.parent_path()).read();
     world.name = path.stem().string();
     return world;

@@ -9,12 +9,14 @@
 #include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
 
+#include <sys/stat.h>
 #include <unistd.h>
 
 #include <array>
 #include <filesystem>
 #include <fstream>
 #include <iterator>
+#include <utility>
 #include <vector>
 
 using view_servo::ImageError;
@@ -127,6 +129,38 @@ TEST(ToGrey, MapsTheWhole16BitRange)
   EXPECT_EQ(grey.at<uchar>(0, 0), 0);
   EXPECT_EQ(grey.at<uchar>(0, 1), 128);
   EXPECT_EQ(grey.at<uchar>(5, 5), 255);
+}
+
+TEST(ToGrey, StretchesAPartOfThe16BitRange)
+{
+  const cv::Mat picture = randomImage(CV_8UC1, { 80, 60 });
+  for (const auto& [scale, offset] :
+       { std::pair(4.0, 0.0), std::pair(16.0, 0.0), std::pair(3.0, 200.0), std::pair(1.0, 3000.0) })
+  {
+    cv::Mat image;
+    picture.convertTo(image, CV_16U, scale, offset);
+    const cv::Mat grey = toGrey(image, "image");
+    double low = 0.0;
+    double high = 0.0;
+    cv::minMaxLoc(grey, &low, &high);
+    EXPECT_GT(high - low, 180.0) << scale;
+    // Brighter stays brighter, by the same steps.
+    EXPECT_NEAR(grey.at<uchar>(3, 3) - grey.at<uchar>(5, 5),
+                (picture.at<uchar>(3, 3) - picture.at<uchar>(5, 5)) * (high - low) / 255.0, 2.0);
+  }
+  const cv::Mat noise = toGrey(cv::Mat(60, 80, CV_16UC1, cv::Scalar(3000)), "image");
+  EXPECT_EQ(cv::countNonZero(noise != noise.at<uchar>(0, 0)), 0);
+}
+
+TEST(LackOfLight, IsToldOfPicturesThatShowNothing)
+{
+  using view_servo::lackOfLight;
+  EXPECT_EQ(lackOfLight(randomImage(CV_8UC1, { 80, 60 })), "");
+  EXPECT_EQ(lackOfLight(cv::Mat(60, 80, CV_8UC1, cv::Scalar(3))), "nearly black");
+  EXPECT_EQ(lackOfLight(cv::Mat(60, 80, CV_8UC1, cv::Scalar(250))), "nearly white");
+  cv::Mat even(60, 80, CV_8UC1, cv::Scalar(120));
+  even.at<uchar>(3, 3) = 255;  // one spot is no picture
+  EXPECT_EQ(lackOfLight(even), "nearly the same everywhere");
 }
 
 TEST(ToGrey, RefusesOtherTypes)
@@ -256,7 +290,36 @@ TEST_F(ImageIo, RefusesHugeImagesByTheirHeaderAlone)
   expectRefused(writeBytes("overflow.pgm", "P5\n4294967297 4294967297\n255\n"), "over 50 megapixels");
 }
 
-TEST_F(ImageIo, RefusesHugeImagesOfOtherFormats)
+TEST_F(ImageIo, RefusesHugeBmpAndTiffByTheirHeaderAlone)
 {
-  expectRefused(writeImage("huge.bmp", cv::Mat(5001, 10000, CV_8UC1, cv::Scalar(0))), "over 50 megapixels");
+  using namespace std::string_literals;
+  const std::string bmp = "BM"s + std::string(12, '\0') + "\x28\0\0\0\x10\x27\0\0\xF0\xD8\xFF\xFF"s;  // 10000 x -10000
+  expectRefused(writeBytes("huge.bmp", bmp), "10000 x 10000");
+  const std::string old_bmp = "BM"s + std::string(12, '\0') + "\x0C\0\0\0\x10\x27\x10\x27"s;
+  expectRefused(writeBytes("old.bmp", old_bmp), "10000 x 10000");
+  const std::string tiff = "II*\0\x08\0\0\0\x02\0"s + "\0\1\4\0\1\0\0\0\x10\x27\0\0"s + "\1\1\3\0\1\0\0\0\x10\x27\0\0"s;
+  expectRefused(writeBytes("huge.tif", tiff), "10000 x 10000");
+  const std::string other_order = "MM\0*\0\0\0\x08\0\x03"s + "\1\0\0\3\0\0\0\1\0\x20\0\0"s +
+                                  "\1\1\0\3\0\0\0\1\0\x20\0\0"s + "\1\x16\0\4\0\0\0\1\x10\0\0\0"s;
+  expectRefused(writeBytes("strips.tif", other_order), "32 x 268435456");
+}
+
+TEST_F(ImageIo, ReadsTiffAndBmp)
+{
+  const cv::Mat image = randomImage(CV_8UC1);
+  EXPECT_EQ(difference(readGreyImage(writeImage("a.tiff", image)), image), 0.0);
+  EXPECT_EQ(difference(readGreyImage(writeImage("a.bmp", image)), image), 0.0);
+}
+
+TEST_F(ImageIo, RefusesFormatsThatCannotTellTheirSize)
+{
+  expectRefused(writeBytes("a.pfm", "Pf\n16000 16000\n-1.0\n"), "not an image");
+  expectRefused(writeBytes("a.exr", "\x76\x2f\x31\x01 and so on"), "not an image");
+  expectRefused(writeImage("a.webp", randomImage(CV_8UC3)), "PNG, JPEG, PNM, BMP and TIFF are read");
+}
+
+TEST_F(ImageIo, DoesNotWaitForAPipe)
+{
+  ASSERT_EQ(mkfifo(path("pipe.png").c_str(), 0600), 0);
+  expectRefused(path("pipe.png"), "not a file");
 }

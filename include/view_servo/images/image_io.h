@@ -25,16 +25,23 @@ constexpr int MIN_IMAGE_SIDE = 16;
 
 /**
  * Any 8- or 16-bit image with 1, 3 (BGR) or 4 (BGRA) channels as 8-bit grey; shares the data when it is that already.
+ * 16 bits of which the picture uses less than 0.4 of the range are stretched between the levels of nearly all pixels.
  * @param name what an error calls the image.
  * @throws ImageError for other types, empty images and sizes beyond the two limits.
  */
 cv::Mat toGrey(const cv::Mat& image, const std::string& name);
 
 /**
- * Reads an image file as 8-bit grey.
- * @throws ImageError when it is missing, not readable, not an image or of a size beyond the limits (told from the
- * file's header before it is decoded, for PNG, JPEG and PNM).
+ * The bytes of a PNG, JPEG, PNM, BMP or TIFF file as 8-bit grey. Other formats are refused, as they cannot tell their size
+ * before they are decoded. @param name what an error calls the image.
+ * @throws ImageError when it is not such an image, is damaged, or has a size beyond the limits.
  */
+cv::Mat decodeGreyImage(const std::string& bytes, const std::string& name);
+
+/** The same of a file. @throws ImageError likewise, and when it is missing, not a regular file or not readable. */
 cv::Mat readGreyImage(const std::string& path);
+
+/** Why a grey image, 8 bits, can hardly show anything: "nearly black", "nearly white", "nearly the same everywhere"; or "". */
+std::string lackOfLight(const cv::Mat& grey);
 
 }  // namespace view_servo
