@@ -5,6 +5,7 @@
 #include "view_servo/GetView.h"
 #include "view_servo/ListViews.h"
 #include "view_servo/SaveView.h"
+#include "view_servo/images/image_io.h"
 #include "view_servo/ros/camera_input.h"
 #include "view_servo/ros/conversions.h"
 #include "view_servo/ros/image_source.h"
@@ -72,14 +73,16 @@ private:
     view.stamp = source.header.stamp.toSec();
     view.frame_id = source.header.frame_id;
     view.pose = source.pose ? source.pose : lookUpPose(source.header);
-    {
+    const std::string warning = [&] {
       const std::lock_guard<std::mutex> lock(write_mutex_);
-      store_.save(view, request.overwrite);
-    }
+      return store_.save(view, request.overwrite);
+    }();
+    const std::string lack = lackOfLight(view.region.empty() ? view.image : view.image(view.region));
     response.success = true;
     response.message = "saved view '" + view.name + "', " + std::to_string(view.image.cols) + " x " +
                        std::to_string(view.image.rows) + (view.camera ? "" : ", without a calibration") +
-                       (view.pose ? ", with its pose in " + view.pose->frame : ", without a pose");
+                       (view.pose ? ", with its pose in " + view.pose->frame : ", without a pose") +
+                       (lack.empty() ? "" : "; but the picture is " + lack) + (warning.empty() ? "" : "; " + warning);
     ROS_INFO_STREAM(response.message);
   }
 
@@ -101,12 +104,12 @@ private:
 
   void remove(const DeleteView::Request& request, DeleteView::Response& response)
   {
-    {
+    const std::string warning = [&] {
       const std::lock_guard<std::mutex> lock(write_mutex_);
-      store_.remove(request.name);
-    }
+      return store_.remove(request.name);
+    }();
     response.success = true;
-    response.message = "deleted view '" + request.name + "'";
+    response.message = "deleted view '" + request.name + "'" + (warning.empty() ? "" : "; " + warning);
     ROS_INFO_STREAM(response.message);
   }
 

@@ -441,6 +441,10 @@ ViewMatch LineViewMatcher::match(const PreparedImage& reference, const PreparedI
   current.lines();
   clock.finish("current");
   ViewMatch result = match(reference.lines(), current.lines(), model, groups);
+  if (result.outcome != MatchOutcome::MATCHED)
+  {
+    result.message += noteOfLight(reference, current);
+  }
   result.stages.insert(result.stages.begin(), stages.begin(), stages.end());
   result.elapsed_ms = clock.total();
   return result;

@@ -428,12 +428,12 @@ ViewMatch PointViewMatcher::match(const PreparedImage& reference, const Prepared
     result.outcome = MatchOutcome::TOO_FEW_FEATURES;
     result.message = "too few corners: " + std::to_string(reference.points(0).corners.size()) + " in the reference, " +
                      std::to_string(current.points(0).corners.size()) + " in the current image, " +
-                     std::to_string(MIN_CORNERS) + " needed in each";
+                     std::to_string(MIN_CORNERS) + " needed in each" + noteOfLight(reference, current);
   }
   else
   {
     result.message = "no geometry found: the " + std::to_string(result.matches.size()) +
-                     " candidate matches do not support one better than chance would";
+                     " candidate matches do not support one better than chance would" + noteOfLight(reference, current);
   }
   result.elapsed_ms = clock.total();
   return result;

@@ -2,6 +2,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "view_servo/views/prepared_image.h"
 
+#include "view_servo/images/image_io.h"
+
 #include <opencv2/imgproc.hpp>
 
 #include <algorithm>
@@ -108,6 +110,17 @@ const LineFeatures& PreparedImage::lines() const
     lines_ = std::make_unique<LineFeatures>(grey_, detectLineSegments(grey_, params_.segments, region_), params_.lines);
   });
   return *lines_;
+}
+
+std::string noteOfLight(const PreparedImage& reference, const PreparedImage& current)
+{
+  std::string note;
+  for (const auto& [image, name] : { std::pair(&reference, "reference"), std::pair(&current, "current image") })
+  {
+    const std::string lack = lackOfLight(image->grey()(image->region()));
+    note += lack.empty() ? "" : std::string("; the ") + name + " is " + lack;
+  }
+  return note;
 }
 
 }  // namespace view_servo

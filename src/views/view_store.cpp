@@ -3,25 +3,27 @@
 #include "view_servo/views/view_store.h"
 
 #include "view_servo/images/image_io.h"
+#include "view_servo/images/regular_file.h"
 
 #include <yaml-cpp/yaml.h>
 #include <opencv2/imgcodecs.hpp>
 
 #include <fcntl.h>
+#include <sys/file.h>
 #include <unistd.h>
 
 #include <algorithm>
 #include <cerrno>
+#include <chrono>
 #include <cmath>
 #include <cstdint>
-#include <fstream>
-#include <iterator>
 #include <limits>
 #include <sstream>
 #include <stdexcept>
 #include <string>
 #include <string_view>
 #include <system_error>
+#include <thread>
 
 namespace view_servo
 {
@@ -104,6 +106,11 @@ public:
     }
   }
 
+  int get() const
+  {
+    return fd_;
+  }
+
   void sync() const
   {
     if (::fsync(fd_) != 0)
@@ -122,7 +129,10 @@ void syncDirectory(const fs::path& directory)
   Descriptor(directory, O_RDONLY | O_DIRECTORY).sync();
 }
 
-/** After this the file holds either what it held before or all of `bytes`, whatever happens in between. */
+/**
+ * After this the file holds either what it held before or all of `bytes`, whatever happens in between. Its directory has to
+ * be synced before it is certain which of the two.
+ */
 void replaceFile(const fs::path& path, std::string_view bytes)
 {
   const fs::path temporary = path.string() + ".tmp";
@@ -139,35 +149,96 @@ void replaceFile(const fs::path& path, std::string_view bytes)
     fs::remove(temporary, ignored);
     throw;
   }
-  syncDirectory(path.parent_path());
 }
+
+/** Only one process at a time changes a directory's views; others wait. Readers do not take part. */
+class DirectoryLock
+{
+public:
+  /** @throws std::runtime_error when another process holds it for too long. */
+  explicit DirectoryLock(const fs::path& directory) : file_(directory / ".lock", O_RDWR | O_CREAT)
+  {
+    constexpr std::chrono::seconds PATIENCE(10);
+    constexpr std::chrono::milliseconds POLL(5);
+    const auto deadline = std::chrono::steady_clock::now() + PATIENCE;
+    while (::flock(file_.get(), LOCK_EX | LOCK_NB) != 0)
+    {
+      if (errno != EWOULDBLOCK && errno != EINTR)
+      {
+        return;  // a file system without locks: alone, nothing can happen
+      }
+      if (std::chrono::steady_clock::now() > deadline)
+      {
+        throw std::runtime_error("another process has been changing views in " + directory.string() + " for too long");
+      }
+      std::this_thread::sleep_for(POLL);
+    }
+  }
+
+private:
+  Descriptor file_;  // the lock ends with it
+};
 
 /** Empty when there is no such file. */
 std::optional<std::string> readFile(const fs::path& path)
 {
-  std::ifstream file(path, std::ios::binary);
-  if (!file)
+  constexpr std::uintmax_t LARGEST = 4 * MAX_IMAGE_PIXELS;  // no view needs more [bytes]
+  try
   {
-    if (errno == ENOENT)
-    {
-      return std::nullopt;
-    }
-    throwLastError(path);
+    return readRegularFile(path, LARGEST);
   }
-  return std::string(std::istreambuf_iterator<char>(file), std::istreambuf_iterator<char>());
+  catch (const std::runtime_error& error)
+  {
+    throw Damage(path.string() + ": " + error.what());
+  }
 }
 
-/** Removes the view's files that its yaml file, if there is one, does not need. */
+/** Whether a file is one that a view of this name had, or that was on its way to become one: all others are somebody else's. */
+bool isFileOf(const std::string& name, std::string file)
+{
+  constexpr std::string_view TEMPORARY = ".tmp";
+  constexpr std::size_t DIGITS = 16;
+  const auto ends_with = [&](std::string_view end) {
+    return file.size() >= end.size() && file.compare(file.size() - end.size(), end.size(), end) == 0;
+  };
+  if (ends_with(TEMPORARY))
+  {
+    file.resize(file.size() - TEMPORARY.size());
+    if (file == name + ".yaml")
+    {
+      return true;
+    }
+  }
+  const std::string prefix = name + ".";
+  return file.size() == prefix.size() + DIGITS + 4 && file.compare(0, prefix.size(), prefix) == 0 &&
+         ends_with(".png") && file.find_first_not_of("0123456789abcdef", prefix.size()) == prefix.size() + DIGITS;
+}
+
+/** Removes the files of a view that its yaml file, if there is one, does not need. */
 void removeLeftovers(const fs::path& directory, const std::string& name, const std::string& image_file)
 {
-  const std::string prefix = name + ".";  // no valid name contains a dot, so these are this view's files
   for (const fs::directory_entry& entry : fs::directory_iterator(directory))
   {
     const std::string file = entry.path().filename().string();
-    if (file.compare(0, prefix.size(), prefix) == 0 && file != name + ".yaml" && file != image_file)
+    if (file != image_file && isFileOf(name, file))
     {
       fs::remove(entry.path());
     }
+  }
+}
+
+/** What comes after a view has been changed: it does not undo the change when it fails. @return the failure; or "". */
+std::string finishChange(const fs::path& directory, const std::string& name, const std::string& image_file)
+{
+  try
+  {
+    syncDirectory(directory);
+    removeLeftovers(directory, name, image_file);
+    return "";
+  }
+  catch (const std::exception& error)
+  {
+    return std::string("its directory could not be put in order: ") + error.what();
   }
 }
 
@@ -376,7 +447,7 @@ std::optional<StoredView> readView(const fs::path& directory, const std::string&
       }
       StoredView view = fieldsFromYaml(node);
       view.name = name;
-      view.image = cv::imdecode(cv::Mat(1, static_cast<int>(png->size()), CV_8U, png->data()), cv::IMREAD_UNCHANGED);
+      view.image = decodeGreyImage(*png, image_file);
       check(view);
       return view;
     }
@@ -407,14 +478,27 @@ void requireValidName(const std::string& action, const std::string& name)
 
 }  // namespace
 
-void requireSize(const StoredView& view, const cv::Size& camera)
+Camera cameraOf(const StoredView& view, const Camera& current)
 {
-  if (view.image.size() != camera)
+  const Camera& camera = view.camera ? *view.camera : current;
+  const auto refuse = [&](const std::string& what) {
+    throw std::runtime_error("view '" + view.name + "' " + what);
+  };
+  const auto size_of = [](int width, int height) {
+    return std::to_string(width) + " x " + std::to_string(height);
+  };
+  if (view.image.size() != cv::Size(camera.width, camera.height))
   {
-    throw std::runtime_error("view '" + view.name + "' has " + std::to_string(view.image.cols) + " x " +
-                             std::to_string(view.image.rows) + " pixels, the camera " + std::to_string(camera.width) +
-                             " x " + std::to_string(camera.height));
+    refuse("has " + size_of(view.image.cols, view.image.rows) + " pixels, " +
+           (view.camera ? "its calibration is for " : "no calibration, and the camera has ") +
+           size_of(camera.width, camera.height) + ": store it anew");
   }
+  const std::string fault = camera.fault();
+  if (view.camera && !fault.empty())
+  {
+    refuse("was stored with a calibration that cannot be used, store it anew: " + fault);
+  }
+  return camera;
 }
 
 bool isValidViewName(const std::string& name)
@@ -431,13 +515,14 @@ ViewStore::ViewStore(std::filesystem::path directory) : directory_(std::move(dir
 {
 }
 
-void ViewStore::save(const StoredView& view, bool overwrite) const
+std::string ViewStore::save(const StoredView& view, bool overwrite) const
 {
   requireValidName("save", view.name);
   try
   {
     check(view);
     fs::create_directories(directory_);
+    const DirectoryLock lock(directory_);
     const fs::path yaml = yamlPath(directory_, view.name);
     if (!overwrite && fs::exists(yaml))
     {
@@ -449,8 +534,9 @@ void ViewStore::save(const StoredView& view, bool overwrite) const
     const std::string image_file = imageFileName(view.name, png);
 
     replaceFile(directory_ / image_file, png);
+    syncDirectory(directory_);
     replaceFile(yaml, toYamlText(view, image_file));
-    removeLeftovers(directory_, view.name, image_file);
+    return finishChange(directory_, view.name, image_file);
   }
   catch (const ViewStoreError&)
   {
@@ -537,22 +623,26 @@ ViewStore::Listing ViewStore::list() const
   return listing;
 }
 
-void ViewStore::remove(const std::string& name) const
+std::string ViewStore::remove(const std::string& name) const
 {
   requireValidName("remove", name);
+  const fs::path yaml = yamlPath(directory_, name);
   try
   {
-    if (!fs::remove(yamlPath(directory_, name)))
+    if (fs::is_regular_file(yaml))
     {
-      fail("remove", name, "there is none of that name");
+      const DirectoryLock lock(directory_);
+      if (fs::remove(yaml))
+      {
+        return finishChange(directory_, name, "");
+      }
     }
-    syncDirectory(directory_);
-    removeLeftovers(directory_, name, "");
   }
-  catch (const std::system_error& error)
+  catch (const std::exception& error)
   {
     fail("remove", name, error.what());
   }
+  fail("remove", name, fs::exists(yaml) ? yaml.string() + " is not a file" : "there is none of that name");
 }
 
 }  // namespace view_servo

@@ -8,6 +8,7 @@
 #include <opencv2/core.hpp>
 
 #include <sys/ptrace.h>
+#include <sys/stat.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
@@ -18,6 +19,7 @@
 #include <iterator>
 #include <limits>
 #include <set>
+#include <stdexcept>
 #include <thread>
 
 namespace fs = std::filesystem;
@@ -118,6 +120,7 @@ std::set<std::string> filesIn(const fs::path& directory)
   {
     names.insert(entry.path().filename());
   }
+  names.erase(".lock");
   return names;
 }
 
@@ -129,7 +132,7 @@ std::string errorOf(const Action& action)
   {
     action();
   }
-  catch (const ViewStoreError& error)
+  catch (const std::runtime_error& error)
   {
     EXPECT_EQ(std::string(error.what()).find('\n'), std::string::npos) << error.what();
     return error.what();
@@ -533,6 +536,104 @@ TEST_F(ViewStoreTest, HoldsTheOldOrTheNewViewWhereverSavingIsKilled)
   }
   EXPECT_GT(seen_before, 5);
   EXPECT_GT(seen_after, 5);
+}
+
+TEST(CameraOfAView, IsTheOneItWasStoredWith)
+{
+  StoredView view = plainView("desk");
+  Camera current;
+  current.width = view.image.cols;
+  current.height = view.image.rows;
+  current.k << 500.0, 0.0, 30.0, 0.0, 500.0, 20.0, 0.0, 0.0, 1.0;
+  EXPECT_EQ(cameraOf(view, current).k, current.k);  // it was stored without any
+  Camera other = current;
+  other.width = 640;
+  EXPECT_ERROR(cameraOf(view, other), "no calibration, and the camera has 640 x");
+  view.camera = current;
+  view.camera->k(0, 0) = 700.0;
+  EXPECT_EQ(cameraOf(view, other).k(0, 0), 700.0);
+  view.camera->height = 17;
+  EXPECT_ERROR(cameraOf(view, other), "its calibration is for");
+  view.camera->height = current.height;
+  view.camera->distortion = { 0.1, 0.2, 0.3 };
+  view.camera->distortion_model = "plumb_bob";
+  EXPECT_ERROR(cameraOf(view, other), "store it anew: D has 3 coefficients");
+}
+
+TEST_F(ViewStoreTest, LeavesFilesOfOthersAlone)
+{
+  store_.save(plainView("dock"), false);
+  const std::set<std::string> others = { "dock.backup.yaml", "dock.photo.png",
+                                         "dock.txt",         "dock.0123.png",
+                                         "dock.tmp",         "dock2.yaml.tmp",
+                                         "dock.png.tmp",     "dock.0123456789ABCDEF.png" };
+  for (const std::string& other : others)
+  {
+    writeBytes(store_.directory() / other, "mine");
+  }
+  EXPECT_EQ(store_.save(plainView("dock", 2), true), "");
+  EXPECT_EQ(store_.remove("dock"), "");
+  EXPECT_EQ(filesIn(store_.directory()), others);
+}
+
+TEST_F(ViewStoreTest, NeverWaitsForWhatIsNotAFile)
+{
+  store_.save(plainView("desk"), false);
+  ASSERT_EQ(mkfifo((store_.directory() / "pipe.yaml").c_str(), 0600), 0);
+  fs::create_symlink("loop.yaml", store_.directory() / "loop.yaml");
+  fs::create_symlink("/dev/zero", store_.directory() / "zero.yaml");
+  fs::create_directory(store_.directory() / "folder.yaml");
+  const ViewStore::Listing listing = store_.list();
+  EXPECT_EQ(listing.names, std::vector<std::string>{ "desk" });
+  ASSERT_EQ(listing.damaged.size(), 4U);
+  for (const ViewStore::Damaged& damaged : listing.damaged)
+  {
+    EXPECT_NE(damaged.reason, "");
+    EXPECT_THROW(store_.load(damaged.name), ViewStoreError);
+    EXPECT_THROW(store_.revision(damaged.name), ViewStoreError);
+    EXPECT_THROW(store_.save(plainView(damaged.name), false), ViewStoreError);
+    EXPECT_THROW(store_.remove(damaged.name), ViewStoreError);
+  }
+  EXPECT_EQ(filesIn(store_.directory()).size(), 6U);
+}
+
+TEST_F(ViewStoreTest, TwoProcessesSaveOneName)
+{
+  constexpr int TIMES = 60;
+  const auto save_often = [this](int seed) {
+    for (int i = 0; i < TIMES; ++i)
+    {
+      store_.save(plainView("dock", seed), true);
+    }
+  };
+  store_.save(plainView("dock", 1), false);
+  const pid_t child = fork();
+  if (child == 0)
+  {
+    try
+    {
+      save_often(2);
+      _exit(0);
+    }
+    catch (const std::exception&)
+    {
+      _exit(1);
+    }
+  }
+  std::atomic<bool> done{ false };
+  std::thread reader([&] {
+    while (!done)
+    {
+      EXPECT_NO_THROW(store_.load("dock"));
+    }
+  });
+  EXPECT_NO_THROW(save_often(3));
+  int status = -1;
+  waitpid(child, &status, 0);
+  done = true;
+  reader.join();
+  EXPECT_EQ(status, 0);
+  EXPECT_EQ(filesIn(store_.directory()).size(), 2U);
 }
 
 TEST_F(ViewStoreTest, ReadersSeeTheOldOrTheNewViewWhileItIsSaved)

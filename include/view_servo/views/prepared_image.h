@@ -13,6 +13,7 @@
 #include <array>
 #include <memory>
 #include <mutex>
+#include <string>
 
 namespace view_servo
 {
@@ -95,5 +96,8 @@ private:
   mutable std::once_flag lines_once_;
   mutable std::unique_ptr<LineFeatures> lines_;
 };
+
+/** For the message of a failure: which of the two regions can hardly show anything, see lackOfLight(); or "". */
+std::string noteOfLight(const PreparedImage& reference, const PreparedImage& current);
 
 }  // namespace view_servo

@@ -46,17 +46,20 @@ public:
 /** Whether a name matches [A-Za-z0-9][A-Za-z0-9_-]{0,63}: it becomes part of a file's name. */
 bool isValidViewName(const std::string& name);
 
-/** @throws std::runtime_error when the view's image has another size than the camera's. */
-void requireSize(const StoredView& view, const cv::Size& camera);
+/**
+ * The camera that a view was taken with. For one that was stored without a calibration this is `current`, the camera that
+ * is there now. @throws std::runtime_error when its image is of neither, and when its calibration cannot be used.
+ */
+Camera cameraOf(const StoredView& view, const Camera& current);
 
 /**
  * Stored views in a directory, one `NAME.yaml` each beside its image `NAME.HASH.png`.
  *
  * A view exists when its yaml file does: it names the image, its size and checksum, and is put in place by rename(2)
  * after image and yaml were written and synced. So a crash leaves either the old view or the new one, and at most an
- * unreferenced file, which the next save or removal of that name deletes. Views do not share files: a damaged one is
- * reported by name and the others stay usable. Several processes may use a directory as long as only one at a time
- * writes a name.
+ * unreferenced file, which the next save or removal of that name deletes. No other file is touched. Views do not share
+ * files: a damaged one is reported by name and the others stay usable. Several processes may use a directory; those that
+ * change it take turns by a file `.lock` in it, and of two that save one name the last one wins.
  */
 class ViewStore
 {
@@ -70,9 +73,10 @@ public:
   }
 
   /**
+   * @return what failed after the view was in place, in one line; empty: nothing.
    * @throws ViewStoreError for a bad name, image or region, for a name in use unless `overwrite`, and on a full disk.
    */
-  void save(const StoredView& view, bool overwrite) const;
+  std::string save(const StoredView& view, bool overwrite) const;
 
   /** @throws ViewStoreError when there is no such view or it is damaged. */
   StoredView load(const std::string& name) const;
@@ -93,8 +97,8 @@ public:
   /** Checks every view's yaml and image. */
   Listing list() const;
 
-  /** @throws ViewStoreError when there is no such view; damaged views can be removed. */
-  void remove(const std::string& name) const;
+  /** @return as save(). @throws ViewStoreError when there is no such view; damaged views can be removed. */
+  std::string remove(const std::string& name) const;
 
 private:
   std::filesystem::path directory_;
