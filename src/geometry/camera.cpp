@@ -3,9 +3,12 @@
 #include "view_servo/geometry/camera.h"
 
 #include <Eigen/Geometry>
+#include <Eigen/LU>
 #include <opencv2/calib3d.hpp>
 #include <opencv2/core/eigen.hpp>
 
+#include <algorithm>
+#include <cmath>
 #include <limits>
 #include <stdexcept>
 
@@ -14,23 +17,78 @@ namespace view_servo
 namespace
 {
 constexpr double NOT_A_NUMBER = std::numeric_limits<double>::quiet_NaN();
+constexpr std::size_t FISHEYE_COEFFICIENTS = 4;
 
 /** A pixel whose undistorted point comes back this far off lies where the distortion has no inverse [px]. */
 constexpr double MAX_INVERSION_ERROR = 0.1;
 
-/** The coefficients in OpenCV's order, which is ROS' for both models; empty when there is no distortion. */
-std::vector<double> openCvDistortion(const Camera& camera)
+/** As functions of OpenCV want them: it cannot be called with no points at all. */
+using CvPoints = std::vector<cv::Point2d>;
+
+bool isFisheye(const Camera& camera)
 {
+  return camera.distortion_model == "equidistant";
+}
+
+bool isZero(const std::vector<double>& numbers)
+{
+  return std::all_of(numbers.begin(), numbers.end(), [](double number) { return number == 0.0; });
+}
+
+bool isOneOf(std::size_t count, std::initializer_list<std::size_t> counts)
+{
+  return std::find(counts.begin(), counts.end(), count) != counts.end();
+}
+
+/** What is wrong with model and coefficients; empty: nothing. */
+std::string faultOfDistortion(const Camera& camera)
+{
+  const std::string& model = camera.distortion_model;
   const std::size_t count = camera.distortion.size();
-  // Simulated cameras often name a model and give no coefficients.
-  const bool usable = count == 0 || (camera.distortion_model == "plumb_bob" && (count == 4 || count == 5)) ||
-                      (camera.distortion_model == "rational_polynomial" && count == 8);
-  if (!usable)
+  const auto wrong = [&](const std::string& right) {
+    return "D has " + std::to_string(count) + " coefficients, distortion_model '" + model + "' has " + right;
+  };
+  if (!std::all_of(camera.distortion.begin(), camera.distortion.end(),
+                   [](double number) { return std::isfinite(number); }))
   {
-    throw std::invalid_argument("distortion model '" + camera.distortion_model + "' with " + std::to_string(count) +
-                                " coefficients is not supported");
+    return "a number in D is not finite";
   }
-  return camera.distortion;
+  if (model == "plumb_bob")
+  {
+    return isOneOf(count, { 0, 4, 5 }) ? "" : wrong("4 or 5");
+  }
+  if (model == "rational_polynomial")
+  {
+    return isOneOf(count, { 0, 5, 8, 12, 14 }) ? "" : wrong("5, 8, 12 or 14");
+  }
+  if (isFisheye(camera))
+  {
+    // Some drivers write five numbers for every model.
+    const bool fits = isOneOf(count, { 0, FISHEYE_COEFFICIENTS }) ||
+                      (count == FISHEYE_COEFFICIENTS + 1 && camera.distortion.back() == 0.0);
+    return fits ? "" : wrong("4");
+  }
+  if (model.empty() || model == "none" || model == "None" || model == "NONE")
+  {
+    return isZero(camera.distortion) ? "" : "D is not zero, but distortion_model is '" + model + "'";
+  }
+  return "distortion_model '" + model + "' is not known: plumb_bob, rational_polynomial and equidistant are";
+}
+
+void requireDistortion(const Camera& camera)
+{
+  const std::string fault = faultOfDistortion(camera);
+  if (!fault.empty())
+  {
+    throw std::invalid_argument(fault);
+  }
+}
+
+cv::Vec4d fisheyeCoefficients(const Camera& camera)
+{
+  cv::Vec4d coefficients = cv::Vec4d::all(0.0);
+  std::copy_n(camera.distortion.begin(), std::min(camera.distortion.size(), FISHEYE_COEFFICIENTS), coefficients.val);
+  return coefficients;
 }
 
 cv::Matx33d intrinsics(const Camera& camera)
@@ -40,36 +98,146 @@ cv::Matx33d intrinsics(const Camera& camera)
   return k;
 }
 
+CvPoints toCv(const Points& points)
+{
+  CvPoints result(points.size());
+  std::transform(points.begin(), points.end(), result.begin(),
+                 [](const Eigen::Vector2d& point) { return cv::Point2d(point.x(), point.y()); });
+  return result;
+}
+
+Points fromCv(const CvPoints& points)
+{
+  Points result(points.size());
+  std::transform(points.begin(), points.end(), result.begin(),
+                 [](const cv::Point2d& point) { return Eigen::Vector2d(point.x, point.y); });
+  return result;
+}
+
 }  // namespace
+
+std::string Camera::fault() const
+{
+  if (!k.allFinite() || !rectification.allFinite() || !projection.allFinite())
+  {
+    return "a number in K, R or P is not finite";
+  }
+  if (k(0, 0) == 0.0 && k(1, 1) == 0.0)
+  {
+    return "the camera is not calibrated: K has no focal lengths";
+  }
+  if (!calibrated())
+  {
+    return "the focal lengths in K have to be positive";
+  }
+  if (width <= 0 || height <= 0)
+  {
+    return "width and height have to be positive";
+  }
+  if (!projection.leftCols<3>().isZero(0.0) && !(projection(0, 0) > 0.0 && projection(1, 1) > 0.0))
+  {
+    return "the focal lengths in P have to be positive";
+  }
+  constexpr double ROUNDING = 1e-3;
+  const Eigen::Matrix3d rotation = rectifyingRotation();
+  if (!(rotation * rotation.transpose()).isIdentity(ROUNDING) || rotation.determinant() < 0.0)
+  {
+    return "R is no rotation";
+  }
+  return faultOfDistortion(*this);
+}
+
+bool Camera::isPinhole() const
+{
+  return !isFisheye(*this) && isZero(distortion);
+}
+
+Camera Camera::rectified() const
+{
+  if (isPinhole())
+  {
+    return *this;
+  }
+  Camera pinhole;
+  pinhole.width = width;
+  pinhole.height = height;
+  pinhole.k = projection.leftCols<3>().isZero(0.0) ? k : Eigen::Matrix3d(projection.leftCols<3>());
+  pinhole.projection.leftCols<3>() = pinhole.k;
+  return pinhole;
+}
+
+Points Camera::normalized(const Points& pixels) const
+{
+  requireDistortion(*this);
+  Points points(pixels.size(), Eigen::Vector2d::Constant(NOT_A_NUMBER));
+  if (!calibrated() || pixels.empty())
+  {
+    return points;
+  }
+  if (isPinhole())
+  {
+    const Eigen::Matrix3d inverse = k.inverse();
+    std::transform(pixels.begin(), pixels.end(), points.begin(),
+                   [&](const Eigen::Vector2d& pixel) { return (inverse * pixel.homogeneous()).hnormalized(); });
+    return points;
+  }
+  CvPoints undistorted;
+  if (isFisheye(*this))
+  {
+    cv::fisheye::undistortPoints(toCv(pixels), undistorted, intrinsics(*this), fisheyeCoefficients(*this));
+  }
+  else
+  {
+    // OpenCV's own default stops after five iterations, which is pixels off at the edge of a wide-angle lens.
+    const cv::TermCriteria until(cv::TermCriteria::COUNT | cv::TermCriteria::EPS, 100, 1e-9);
+    cv::undistortPoints(toCv(pixels), undistorted, intrinsics(*this), distortion, cv::noArray(), cv::noArray(), until);
+  }
+  const Points found = fromCv(undistorted);
+  const Points back = distorted(found);
+  for (std::size_t i = 0; i < pixels.size(); ++i)
+  {
+    if ((back[i] - pixels[i]).norm() <= MAX_INVERSION_ERROR)
+    {
+      points[i] = found[i];
+    }
+  }
+  return points;
+}
 
 Eigen::Vector2d Camera::normalized(const Eigen::Vector2d& pixel) const
 {
-  const std::vector<double> coefficients = openCvDistortion(*this);
-  if (!calibrated() || !pixel.allFinite())
+  return normalized(Points{ pixel }).front();
+}
+
+Points Camera::distorted(const Points& points) const
+{
+  requireDistortion(*this);
+  if (!calibrated() || points.empty())
   {
-    return Eigen::Vector2d::Constant(NOT_A_NUMBER);
+    return Points(points.size(), Eigen::Vector2d::Constant(NOT_A_NUMBER));
   }
-  const std::vector<cv::Point2d> in{ { pixel.x(), pixel.y() } };
-  std::vector<cv::Point2d> out;
-  // OpenCV's own default stops after five iterations, which is pixels off at the edge of a wide-angle lens.
-  const cv::TermCriteria until(cv::TermCriteria::COUNT | cv::TermCriteria::EPS, 100, 1e-9);
-  cv::undistortPoints(in, out, intrinsics(*this), coefficients, cv::noArray(), cv::noArray(), until);
-  const Eigen::Vector2d point(out[0].x, out[0].y);
-  const double error = (project(point.homogeneous()) - pixel).norm();
-  return error <= MAX_INVERSION_ERROR ? point : Eigen::Vector2d::Constant(NOT_A_NUMBER);
+  CvPoints pixels;
+  if (isFisheye(*this))
+  {
+    cv::fisheye::distortPoints(toCv(points), pixels, intrinsics(*this), fisheyeCoefficients(*this));
+  }
+  else
+  {
+    std::vector<cv::Point3d> rays(points.size());
+    std::transform(points.begin(), points.end(), rays.begin(),
+                   [](const Eigen::Vector2d& point) { return cv::Point3d(point.x(), point.y(), 1.0); });
+    cv::projectPoints(rays, cv::Vec3d(), cv::Vec3d(), intrinsics(*this), distortion, pixels);
+  }
+  return fromCv(pixels);
 }
 
 Eigen::Vector2d Camera::project(const Eigen::Vector3d& point) const
 {
-  const std::vector<double> coefficients = openCvDistortion(*this);
-  if (!calibrated() || !point.allFinite() || point.z() <= 0.0)
-  {
-    return Eigen::Vector2d::Constant(NOT_A_NUMBER);
-  }
-  const std::vector<cv::Point3d> in{ { point.x(), point.y(), point.z() } };
-  std::vector<cv::Point2d> out;
-  cv::projectPoints(in, cv::Vec3d(), cv::Vec3d(), intrinsics(*this), coefficients, out);
-  return { out[0].x, out[0].y };
+  const bool in_front = point.allFinite() && point.z() > 0.0;
+  const Eigen::Vector2d on_plane =
+      in_front ? Eigen::Vector2d(point.hnormalized()) : Eigen::Vector2d(Eigen::Vector2d::Constant(NOT_A_NUMBER));
+  const Eigen::Vector2d pixel = distorted(Points{ on_plane }).front();
+  return in_front ? pixel : on_plane;
 }
 
 }  // namespace view_servo

@@ -293,10 +293,14 @@ private:
     }
     const cv::Mat image = toGrey(*frame.image, camera_.imageTopic());
     std::string news;
-    const std::string jump = session_->checkTime(header.stamp);
-    if (!jump.empty())
+    const StampOrder::Place place = session_->checkTime(header.stamp);
+    if (place == StampOrder::LATE || place == StampOrder::FAR_LATE)
     {
-      ROS_WARN_STREAM(jump << ": the view is looked for anew");
+      return;  // a newer image has been followed already
+    }
+    if (place == StampOrder::GONE_BACK)
+    {
+      ROS_WARN_STREAM("time has gone back in images: the view is looked for anew");
       ++era_;
       news = LOOKS_FOR_IT;
     }

@@ -5,11 +5,12 @@
 #include "view_servo/ServoError.h"
 #include "view_servo/ServoToViewAction.h"
 #include "view_servo/control/joint_guard.h"
+#include "view_servo/geometry/camera_warp.h"
 #include "view_servo/ros/arm_conversions.h"
 #include "view_servo/ros/conversions.h"
 #include "view_servo/ros/driver_node.h"
 #include "view_servo/ros/image_source.h"
-#include "view_servo/ros/rectifier.h"
+#include "view_servo/ros/transform_source.h"
 #include "view_servo/ros/view_answer.h"
 #include "view_servo/views/view_store.h"
 
@@ -37,13 +38,14 @@ constexpr double NOT_A_NUMBER = std::numeric_limits<double>::quiet_NaN();
 /** A goal that is ready, then on its way. */
 struct ServoTask
 {
-  ServoTask(const Rectifier& camera_rectifier, const ServoTarget& servo_target, const Servo25dParams& params)
-    : rectifier(camera_rectifier), target(servo_target), servo(target, params)
+  ServoTask(sensor_msgs::CameraInfo::ConstPtr camera_info, const ServoTarget& servo_target,
+            const Servo25dParams& params)
+    : info(std::move(camera_info)), target(servo_target), servo(target, params)
   {
   }
 
   std::string view;
-  Rectifier rectifier;
+  sensor_msgs::CameraInfo::ConstPtr info;
   ServoTarget target;
   Servo25d servo;
   std::chrono::steady_clock::time_point start;
@@ -126,15 +128,21 @@ public:
       info = context_.locked([this] { return info_; });
       return info ? "" : "no camera_info has come on " + context_.quoted("camera_info");
     });
-    if (!isCalibrated(*info))
+    const Camera camera = toCamera(*info);
+    const std::string fault = faultOf(camera);
+    if (!fault.empty())
     {
-      throw std::runtime_error(uncalibrated());
+      throw std::runtime_error(fault);
     }
-    const Rectifier rectifier(*info);
-    const cv::Size size = rectifier.size();
-    requireSize(stored, size);
-    const cv::Rect region = stored.region.empty() ? cv::Rect(cv::Point(), size) : stored.region;
-    const Eigen::Vector2d middle(region.x + 0.5 * (region.width - 1), region.y + 0.5 * (region.height - 1));
+    const CameraWarp warp(cameraOf(stored, camera), camera.rectified());
+    const cv::Size size = warp.size();
+    const cv::Rect region = stored.region.empty() ? cv::Rect(cv::Point(), stored.image.size()) : stored.region;
+    const Eigen::Vector2d middle =
+        warp.point({ region.x + 0.5 * (region.width - 1), region.y + 0.5 * (region.height - 1) });
+    if (!middle.allFinite())
+    {
+      throw std::runtime_error("this camera cannot show the middle of the region of view '" + stored.name + "'");
+    }
     Servo25dParams params = params_.servo;
     const auto set = [](double wanted, double& value) {
       value = wanted > 0.0 ? wanted : value;
@@ -142,8 +150,7 @@ public:
     set(goal.translation_tolerance, params.translation_tolerance);
     set(goal.rotation_tolerance, params.rotation_tolerance);
     set(goal.dwell, params.dwell);
-    auto task = std::make_unique<Task>(
-        rectifier, ServoTarget{ rectifier.k(), { size.width, size.height }, rectifier.point(middle) }, params);
+    auto task = std::make_unique<Task>(info, ServoTarget{ warp.to().k, { size.width, size.height }, middle }, params);
     task->view = stored.name;
     context_.waitFor([this] { return context_.locked([this] { return missingAnswer({ &answer_ }); }); });
     return task;
@@ -153,7 +160,7 @@ public:
   {
     task_ = std::move(task);
     task_->start = Clock::now();
-    camera_frame_ = info_->header.frame_id;
+    camera_frame_ = withoutSlash(info_->header.frame_id);
     joints_.clearStuck();
     joint_states_.setNeeded(joint_states_.fresh());
     onCameraInfo(info_);  // it may have changed since
@@ -279,9 +286,11 @@ private:
     return std::chrono::duration<double>(Clock::now().time_since_epoch()).count();
   }
 
-  std::string uncalibrated() const
+  /** Why a camera cannot be used; empty when it can. */
+  std::string faultOf(const Camera& camera) const
   {
-    return "the camera is not calibrated: K is all zero in " + context_.quoted("camera_info");
+    const std::string fault = camera.fault();
+    return fault.empty() ? "" : fault + ", in " + context_.quoted("camera_info");
   }
 
   // ------------------------------------------------------------------------------------------------------- inputs
@@ -289,9 +298,10 @@ private:
   void onCameraInfo(const sensor_msgs::CameraInfo::ConstPtr& message)
   {
     info_ = message;
-    if (task_ && !task_->rectifier.hasCalibration(*message))
+    if (task_ && !sameCalibration(*task_->info, *message))
     {
-      context_.abort(isCalibrated(*message) ? "the camera's calibration has changed" : uncalibrated());
+      const std::string fault = faultOf(toCamera(*message));
+      context_.abort(fault.empty() ? "the camera's calibration has changed" : fault);
     }
   }
 
@@ -321,12 +331,12 @@ private:
       return;
     }
     const std::string topic = "homographies on " + context_.quoted("homography");
-    const bool usable = homographies_.checkStamp(message.header.stamp);
+    const DriverInput::Stamp stamp = homographies_.checkStamp(message.header.stamp);
     if (!homographies_.jump().empty())
     {
       context_.abort(homographies_.jump());
     }
-    if (!usable || !task_)
+    if (stamp != DriverInput::Stamp::NEWEST || !task_)
     {
       return;
     }
@@ -368,7 +378,7 @@ private:
     {
       return "name no camera frame";
     }
-    camera_frame_ = message.header.frame_id;
+    camera_frame_ = withoutSlash(message.header.frame_id);
     try
     {
       const PlaneView view = toPlaneView(message);

@@ -172,23 +172,17 @@ void CameraInput::onPair(const sensor_msgs::ImageConstPtr& image, const sensor_m
 
 std::string CameraInput::faultOf(const sensor_msgs::Image& image, const sensor_msgs::CameraInfo& info) const
 {
-  if (!isCalibrated(info))
+  const Camera camera = toCamera(info);
+  const std::string fault = camera.fault();
+  if (!fault.empty())
   {
-    return "the camera is not calibrated: K is all zero, or a number is not finite, in " + topics();
+    return fault + ", in " + topics();
   }
-  try
+  if (camera.width != static_cast<int>(image.width) || camera.height != static_cast<int>(image.height))
   {
-    const Camera camera = toCamera(info);
-    if (camera.width != static_cast<int>(image.width) || camera.height != static_cast<int>(image.height))
-    {
-      return "the calibration is for " + std::to_string(camera.width) + " x " + std::to_string(camera.height) +
-             " pixels and the image has " + std::to_string(image.width) + " x " + std::to_string(image.height) +
-             ", in " + topics();
-    }
-  }
-  catch (const std::exception& error)
-  {
-    return "the calibration cannot be used: " + oneLine(error) + ", in " + topics();
+    return "the calibration is for " + std::to_string(camera.width) + " x " + std::to_string(camera.height) +
+           " pixels and the image has " + std::to_string(image.width) + " x " + std::to_string(image.height) + ", in " +
+           topics();
   }
   return "";
 }

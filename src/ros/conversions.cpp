@@ -5,7 +5,6 @@
 #include "view_servo/images/image_io.h"
 
 #include <cv_bridge/cv_bridge.h>
-#include <image_geometry/pinhole_camera_model.h>
 #include <sensor_msgs/image_encodings.h>
 
 #include <algorithm>
@@ -51,15 +50,6 @@ ros::Time toStamp(double seconds)
   return ros::Time(std::isfinite(seconds) ? std::clamp(seconds, 0.0, LARGEST) : 0.0);
 }
 
-bool isCalibrated(const sensor_msgs::CameraInfo& info)
-{
-  const auto is_finite = [](const auto& numbers) {
-    return std::all_of(numbers.begin(), numbers.end(), [](double number) { return std::isfinite(number); });
-  };
-  return info.K[0] > 0.0 && info.K[4] > 0.0 && is_finite(info.K) && is_finite(info.D) && is_finite(info.R) &&
-         is_finite(info.P);
-}
-
 bool sameCalibration(const sensor_msgs::CameraInfo& a, const sensor_msgs::CameraInfo& b)
 {
   sensor_msgs::CameraInfo other = b;
@@ -69,17 +59,27 @@ bool sameCalibration(const sensor_msgs::CameraInfo& a, const sensor_msgs::Camera
 
 Camera toCamera(const sensor_msgs::CameraInfo& info)
 {
-  image_geometry::PinholeCameraModel model;
-  model.fromCameraInfo(info);
+  const bool whole = info.roi.width == 0 || info.roi.height == 0;
+  const std::uint32_t width = whole ? info.width : info.roi.width;
+  const std::uint32_t height = whole ? info.height : info.roi.height;
+  const double bin_x = std::max(info.binning_x, 1U);  // 0 means 1
+  const double bin_y = std::max(info.binning_y, 1U);
 
+  // Pixels of the sensor -> pixels of the image.
+  Eigen::Matrix3d to_image = Eigen::Vector3d(1.0 / bin_x, 1.0 / bin_y, 1.0).asDiagonal();
+  if (!whole)
+  {
+    to_image(0, 2) = -(info.roi.x_offset / bin_x);
+    to_image(1, 2) = -(info.roi.y_offset / bin_y);
+  }
   Camera camera;
-  camera.width = model.reducedResolution().width;
-  camera.height = model.reducedResolution().height;
+  camera.width = static_cast<int>(width / bin_x);
+  camera.height = static_cast<int>(height / bin_y);
   camera.distortion_model = info.distortion_model;
   camera.distortion = info.D;
-  camera.k = Eigen::Map<const Eigen::Matrix<double, 3, 3, Eigen::RowMajor>>(model.intrinsicMatrix().val);
-  camera.rectification = Eigen::Map<const Eigen::Matrix<double, 3, 3, Eigen::RowMajor>>(model.rotationMatrix().val);
-  camera.projection = Eigen::Map<const Eigen::Matrix<double, 3, 4, Eigen::RowMajor>>(model.projectionMatrix().val);
+  camera.k = to_image * Eigen::Map<const Eigen::Matrix<double, 3, 3, Eigen::RowMajor>>(info.K.data());
+  camera.rectification = Eigen::Map<const Eigen::Matrix<double, 3, 3, Eigen::RowMajor>>(info.R.data());
+  camera.projection = to_image * Eigen::Map<const Eigen::Matrix<double, 3, 4, Eigen::RowMajor>>(info.P.data());
   return camera;
 }
 

@@ -52,16 +52,6 @@ SourceKind kindOf(const ImageSource& source, const std::string& name)
   return given.empty() ? SourceKind::CAMERA : given.front().first;
 }
 
-void requireSameSize(const std::string& view, const cv::Size& size, const sensor_msgs::Image& image)
-{
-  if (size.width != static_cast<int>(image.width) || size.height != static_cast<int>(image.height))
-  {
-    throw ImageError("view '" + view + "' has " + std::to_string(size.width) + " x " + std::to_string(size.height) +
-                     " pixels, the camera's images " + std::to_string(image.width) + " x " +
-                     std::to_string(image.height));
-  }
-}
-
 Parameter viewsDirParameter(std::filesystem::path& views_dir)
 {
   return path("views_dir", views_dir,

@@ -3,7 +3,9 @@
 #include "view_servo/ros/plane_session.h"
 
 #include "view_servo/geometry/homography.h"
-#include "view_servo/ros/node_base.h"
+#include "view_servo/ros/conversions.h"
+
+#include <Eigen/LU>
 
 #include <algorithm>
 #include <cstddef>
@@ -12,58 +14,69 @@
 
 namespace view_servo
 {
-PlaneSession::PlaneSession(std::shared_ptr<const PreparedImage> view, const sensor_msgs::CameraInfo& info,
+PlaneSession::PlaneSession(const CachedView& view, const sensor_msgs::CameraInfo& info,
                            const PlaneTrackerParams& params)
   : params_(params),
-    view_(std::move(view)),
-    rectifier_(info),
-    reference_(rectifier_.image(view_->grey())),
-    region_(rectifier_.region(view_->region()))
+    view_(view.image),
+    info_(info),
+    rectification_(toCamera(info), toCamera(info).rectified()),
+    view_warp_(cameraOf(view.stored, toCamera(info)), rectification_.to()),
+    reference_(view_warp_.image(view_->grey())),
+    region_(view_warp_.region(view_->region()))
 {
   if (region_.empty())
   {
-    throw std::runtime_error("the view's region is not in the image without the camera's distortion");
+    throw std::runtime_error("this camera shows nothing of the view's region without distortion, whereever it is");
   }
   reset();
 }
 
 void PlaneSession::reset()
 {
-  tracker_ = std::make_unique<PlaneTracker>(reference_, region_, rectifier_.k(), params_);
+  tracker_ = std::make_unique<PlaneTracker>(reference_, region_, rectification_.to().k, params_);
   last_h_.reset();
   path_.clear();
 }
 
 bool PlaneSession::checkCalibration(const sensor_msgs::CameraInfo& info)
 {
-  calibration_changed_ = calibration_changed_ || !rectifier_.hasCalibration(info);
+  calibration_changed_ = calibration_changed_ || !sameCalibration(info_, info);
   return !calibration_changed_;
 }
 
-std::string PlaneSession::checkTime(const ros::Time& stamp)
+StampOrder::Place PlaneSession::checkTime(const ros::Time& stamp)
 {
-  std::string jump = timeJump(last_stamp_, stamp, "images");
-  if (!jump.empty())
+  const StampOrder::Place place = order_.check(stamp);
+  if (place == StampOrder::GONE_BACK)
   {
     reset();
   }
-  return jump;
+  return place;
 }
 
 PlaneFinder::Question PlaneSession::question(const cv::Mat& raw) const
 {
-  return { view_, raw, last_h_ };
+  std::optional<Eigen::Matrix3d> last_h = last_h_;
+  if (last_h)
+  {
+    last_h = rectification_.homography().inverse() * *last_h * view_warp_.homography();
+  }
+  return { view_, raw, last_h };
 }
 
 void PlaneSession::start(const PlaneFinder::Answer& answer, const std::optional<Eigen::Isometry3d>& camera_in_odom)
 {
   std::optional<Eigen::Matrix3d> h = answer.h;
-  if (h && rectifier_.active())
+  if (h && (rectification_.active() || view_warp_.active()))
   {
     Correspondences pairs;
     for (const Correspondence& pair : answer.inliers)
     {
-      pairs.push_back({ rectifier_.point(pair.reference), rectifier_.point(pair.current) });
+      const Correspondence moved{ view_warp_.point(pair.reference), rectification_.point(pair.current) };
+      if (moved.reference.allFinite() && moved.current.allFinite())
+      {
+        pairs.push_back(moved);
+      }
     }
     h = homographyFromPoints(pairs);
   }
@@ -76,7 +89,7 @@ void PlaneSession::start(const PlaneFinder::Answer& answer, const std::optional<
 const PlaneTrack& PlaneSession::add(const cv::Mat& raw, const std::optional<Eigen::Isometry3d>& camera_in_odom)
 {
   constexpr std::size_t LONGEST_PATH = 300;
-  last_image_ = rectifier_.image(raw);
+  last_image_ = rectification_.image(raw);
   const PlaneTrack& track = tracker_->add(last_image_, camera_in_odom);
   if (track.state == TrackingState::TRACKING)
   {

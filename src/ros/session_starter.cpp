@@ -44,7 +44,7 @@ SessionStarter::Preparation SessionStarter::prepare(const std::string& view)
   Preparation preparation;
   try
   {
-    const std::shared_ptr<const PreparedImage> stored = views_.get(view);
+    const CachedView stored = views_.get(view);
     const std::string fault = camera_.fault();
     if (!fault.empty())
     {
@@ -60,7 +60,6 @@ SessionStarter::Preparation SessionStarter::prepare(const std::string& view)
       preparation.reason = oneLine(error);
       return preparation;
     }
-    requireSameSize(view, stored->grey().size(), *frame.image);
     if (!params_.odom_frame.empty())
     {
       preparation.reason = transforms_.missing(params_.odom_frame, frame.image->header.frame_id, ros::Time(0));

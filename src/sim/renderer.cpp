@@ -171,17 +171,25 @@ SimulatedCamera::SimulatedCamera(const World& world, const std::vector<std::stri
       throw std::invalid_argument("world '" + world.name + "' has no group '" + group + "'");
     }
   }
-  const bool distorts = std::any_of(world.camera.distortion.begin(), world.camera.distortion.end(),
-                                    [](double value) { return value != 0.0; });
-  if (distorts)
+  if (!world.camera.isPinhole())
   {
     map_u_.create(size_, CV_32F);
     map_v_.create(size_, CV_32F);
+    Points pixels;
     for (int v = 0; v < size_.height; ++v)
     {
       for (int u = 0; u < size_.width; ++u)
       {
-        const Eigen::Vector2d at = world.camera.normalized(Eigen::Vector2d(u, v));
+        pixels.emplace_back(u, v);
+      }
+    }
+    const Points points = world.camera.normalized(pixels);
+    auto next = points.begin();
+    for (int v = 0; v < size_.height; ++v)
+    {
+      for (int u = 0; u < size_.width; ++u)
+      {
+        const Eigen::Vector2d& at = *next++;
         if (!at.allFinite())
         {
           throw std::invalid_argument("the distortion of world '" + world.name + "' has no inverse within the image");

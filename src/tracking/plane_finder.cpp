@@ -58,11 +58,6 @@ cv::Mat withoutRegion(const cv::Mat& grey, const cv::Rect& region, const Eigen::
   return painted;
 }
 
-std::string sizeOf(const cv::Mat& image)
-{
-  return std::to_string(image.cols) + " x " + std::to_string(image.rows);
-}
-
 PlaneFinder::Answer toAnswer(const ViewMatch& match)
 {
   PlaneFinder::Answer answer;
@@ -99,9 +94,9 @@ ViewMatch PlaneFinder::match(const PreparedImage& view, const cv::Mat& image,
 PlaneFinder::Answer PlaneFinder::find(const Question& question, const std::function<bool()>& given_up) const
 {
   const PreparedImage& view = *question.view;
-  if (view.grey().size() != question.image.size())
+  if (question.image.empty())
   {
-    return notFound("the view has " + sizeOf(view.grey()) + " pixels, the image " + sizeOf(question.image));
+    return notFound("the image is empty");
   }
   const ViewMatch first = match(view, question.image, given_up);
   if (first.outcome != MatchOutcome::MATCHED)

@@ -12,28 +12,28 @@ ViewCache::ViewCache(ViewStore store, const FeatureParams& params, std::size_t c
 {
 }
 
-std::shared_ptr<const PreparedImage> ViewCache::get(const std::string& name)
+CachedView ViewCache::get(const std::string& name)
 {
   const std::lock_guard<std::mutex> lock(mutex_);
   const std::string revision = store_.revision(name);
-  const auto known =
-      std::find_if(entries_.begin(), entries_.end(), [&](const Entry& entry) { return entry.name == name; });
+  const auto known = std::find_if(entries_.begin(), entries_.end(),
+                                  [&](const Entry& entry) { return entry.view.stored.name == name; });
   if (known != entries_.end() && known->revision == revision)
   {
     entries_.splice(entries_.begin(), entries_, known);
-    return entries_.front().image;
+    return entries_.front().view;
   }
   if (known != entries_.end())
   {
     entries_.erase(known);
   }
   const StoredView view = store_.load(name);
-  entries_.push_front({ name, revision, std::make_shared<const PreparedImage>(view.image, view.region, params_) });
+  entries_.push_front({ { view, std::make_shared<const PreparedImage>(view.image, view.region, params_) }, revision });
   if (entries_.size() > capacity_)
   {
     entries_.pop_back();
   }
-  return entries_.front().image;
+  return entries_.front().view;
 }
 
 }  // namespace view_servo

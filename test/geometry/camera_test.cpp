@@ -37,6 +37,15 @@ Camera rationalPolynomial()
   return camera;
 }
 
+Camera fisheye(const std::vector<double>& coefficients)
+{
+  Camera camera = pinhole();
+  camera.k(0, 0) = camera.k(1, 1) = 300.0;
+  camera.distortion_model = "equidistant";
+  camera.distortion = coefficients;
+  return camera;
+}
+
 /** The largest distance [px] between pixels of a grid over the image and their way to z = 1 and back. */
 double roundTripError(const Camera& camera)
 {
@@ -114,6 +123,84 @@ TEST(Camera, NormalizedInvertsProject)
   EXPECT_LT(roundTripError(pinhole()), 1e-9);
   EXPECT_LT(roundTripError(plumbBob()), 1e-6);
   EXPECT_LT(roundTripError(rationalPolynomial()), 1e-6);
+  EXPECT_LT(roundTripError(fisheye({})), 1e-6);
+  EXPECT_LT(roundTripError(fisheye({ 0.05, -0.01, 0.002, -0.0003 })), 1e-6);
+}
+
+TEST(Camera, AppliesEquidistantAlsoWithZeros)
+{
+  const double angle = 0.6;
+  const Eigen::Vector3d ray(std::sin(angle), 0.0, std::cos(angle));
+  for (const std::vector<double>& zeros :
+       { std::vector<double>(), std::vector<double>(4, 0.0), std::vector<double>(5, 0.0) })
+  {
+    const Camera camera = fisheye(zeros);
+    EXPECT_EQ(camera.fault(), "");
+    EXPECT_FALSE(camera.isPinhole());
+    EXPECT_NEAR(camera.project(ray).x(), 318.5 + 300.0 * angle, 1e-6);
+    EXPECT_NEAR(camera.normalized({ 318.5 + 300.0 * angle, 242.25 }).x(), std::tan(angle), 1e-6);
+  }
+  const double bent = angle * (1.0 + 0.05 * angle * angle);
+  EXPECT_NEAR(fisheye({ 0.05, 0.0, 0.0, 0.0 }).project(ray).x(), 318.5 + 300.0 * bent, 1e-6);
+}
+
+TEST(Camera, IsAPinholeWithoutCoefficientsUnlessItIsAFisheye)
+{
+  for (const char* model : { "", "none", "None", "plumb_bob", "rational_polynomial" })
+  {
+    Camera camera = pinhole();
+    camera.distortion_model = model;
+    EXPECT_EQ(camera.fault(), "") << model;
+    EXPECT_TRUE(camera.isPinhole()) << model;
+    camera.distortion.assign(5, 0.0);
+    EXPECT_EQ(camera.fault(), "") << model;
+    EXPECT_TRUE(camera.isPinhole()) << model;
+    camera.distortion[0] = 1e-9;
+    EXPECT_FALSE(camera.isPinhole()) << model;
+  }
+}
+
+TEST(Camera, RectifiesToThePinholeOfPOrK)
+{
+  Camera camera = plumbBob();
+  EXPECT_EQ(camera.rectified().k, camera.k);
+  camera.projection.leftCols<3>() = 0.9 * camera.k;
+  camera.projection(2, 2) = 1.0;
+  EXPECT_DOUBLE_EQ(camera.rectified().k(0, 0), 468.0);
+  EXPECT_TRUE(camera.rectified().isPinhole());
+  EXPECT_EQ(camera.rectified().width, camera.width);
+  EXPECT_EQ(camera.rectified().fault(), "");
+  camera.distortion.clear();
+  EXPECT_EQ(camera.rectified().k, camera.k);  // raw images are of a pinhole already
+  camera.rectification.setZero();
+  EXPECT_EQ(camera.rectifyingRotation(), Eigen::Matrix3d::Identity());
+}
+
+TEST(Camera, SaysWhichFieldCannotBeUsed)
+{
+  const auto fault_of = [](const auto& change) {
+    Camera camera = plumbBob();
+    change(camera);
+    return camera.fault();
+  };
+  EXPECT_EQ(fault_of([](Camera&) {}), "");
+  EXPECT_EQ(fault_of([](Camera& c) { c.rectification.setZero(); }), "");
+  const double nan = std::nan("");
+  EXPECT_EQ(fault_of([](Camera& c) { c.k.setZero(); }), "the camera is not calibrated: K has no focal lengths");
+  EXPECT_EQ(fault_of([](Camera& c) { c.k(0, 0) = -520.0; }), "the focal lengths in K have to be positive");
+  EXPECT_EQ(fault_of([&](Camera& c) { c.k(0, 2) = nan; }), "a number in K, R or P is not finite");
+  EXPECT_EQ(fault_of([&](Camera& c) { c.projection(0, 3) = nan; }), "a number in K, R or P is not finite");
+  EXPECT_EQ(fault_of([&](Camera& c) { c.distortion[2] = nan; }), "a number in D is not finite");
+  EXPECT_EQ(fault_of([](Camera& c) { c.rectification(0, 0) = 2.0; }), "R is no rotation");
+  EXPECT_EQ(fault_of([](Camera& c) { c.projection(1, 1) = -3.0; }), "the focal lengths in P have to be positive");
+  EXPECT_EQ(fault_of([](Camera& c) { c.height = 0; }), "width and height have to be positive");
+  EXPECT_EQ(fault_of([](Camera& c) { c.distortion.resize(3); }),
+            "D has 3 coefficients, distortion_model 'plumb_bob' has 4 or 5");
+  EXPECT_EQ(fault_of([](Camera& c) { c.distortion_model = "equidistant"; }),
+            "D has 5 coefficients, distortion_model 'equidistant' has 4");
+  EXPECT_EQ(fault_of([](Camera& c) { c.distortion_model = "none"; }), "D is not zero, but distortion_model is 'none'");
+  EXPECT_EQ(fault_of([](Camera& c) { c.distortion_model = "bent"; }),
+            "distortion_model 'bent' is not known: plumb_bob, rational_polynomial and equidistant are");
 }
 
 TEST(Camera, ModelWithoutCoefficientsIsNotDistorted)
@@ -146,7 +233,7 @@ TEST(Camera, GivesNaNBeyondTheLargestImageOfABarrelDistortion)
 TEST(Camera, RefusesOtherModels)
 {
   Camera camera = pinhole();
-  camera.distortion_model = "equidistant";
+  camera.distortion_model = "bent";
   camera.distortion = { 0.1, 0.01, 0.0, 0.0 };
   EXPECT_THROW(camera.normalized({ 1.0, 2.0 }), std::invalid_argument);
   EXPECT_THROW(camera.project({ 0.0, 0.0, 1.0 }), std::invalid_argument);

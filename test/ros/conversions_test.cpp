@@ -118,9 +118,8 @@ TEST(CameraConversion, TellsAnUncalibratedCamera)
   sensor_msgs::CameraInfo info;
   info.width = 640;
   info.height = 480;
-  EXPECT_FALSE(isCalibrated(info));
-  EXPECT_FALSE(toCamera(info).calibrated());
-  EXPECT_TRUE(isCalibrated(exampleInfo()));
+  EXPECT_EQ(toCamera(info).fault(), "the camera is not calibrated: K has no focal lengths");
+  EXPECT_EQ(toCamera(exampleInfo()).fault(), "");
 }
 
 TEST(ImageConversion, TurnsEveryEncodingIntoTheSameGrey)

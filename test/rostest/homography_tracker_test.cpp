@@ -8,6 +8,8 @@
 #include "view_servo/Homography.h"
 #include "view_servo/SetView.h"
 #include "view_servo/WantedView.h"
+#include "view_servo/geometry/camera_warp.h"
+#include "view_servo/ros/conversions.h"
 #include "view_servo/views/view_store.h"
 
 #include <gtest/gtest.h>
@@ -424,6 +426,28 @@ TEST_F(HomographyAlignerTest, RefusesWhatADriverCannotHave)
   camera_.set(true, 0.0);
   expectTracking(Eigen::Matrix3d::Identity());
   EXPECT_EQ(homographies_.last()->goal, "6");
+}
+
+TEST_F(HomographyAlignerTest, FollowsAViewOfAnotherCamera)
+{
+  const Camera here = toCamera(FakeCamera("none").infoOf(picture(), ros::Time()));
+  Camera there;
+  there.width = 600;
+  there.height = 440;
+  there.k << 430.0, 0.0, 305.0, 0.0, 430.0, 215.0, 0.0, 0.0, 1.0;
+  there.distortion_model = "equidistant";
+  there.distortion.assign(4, 0.0);
+  StoredView view;
+  view.name = "fisheye";
+  view.image = CameraWarp(here, there).image(picture());
+  view.camera = there;
+  ViewStore(viewsDir("homography_tracker")).save(view, true);
+  camera_.show(warped(picture(), exampleHomography()));
+  want("fisheye", "another camera");
+  ASSERT_TRUE(waitForAnswer(homographies_, "another camera", [](const Homography& message) {
+    return message.valid != 0;
+  })) << homographies_.last()->reason;
+  expectTracking(exampleHomography());
 }
 
 TEST_F(HomographyAlignerTest, SaysWhatIsLackingUntilItIsThere)

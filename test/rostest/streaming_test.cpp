@@ -393,22 +393,27 @@ TEST_F(StreamingTest, RefusesAViewThatCannotBeMatched)
   left_.teach("broken", picture_);
   std::ofstream(views / "broken.yaml") << "image: [";
   left_.expectRefusal("broken", "damaged", "broken");
-  StoredView large;
-  large.name = "large";
-  large.image = texturedPicture(1, cv::Size(640, 480));
-  ViewStore(views).save(large, true);
   const auto send = [&] {
     left_.send(seen_);
   };
-  left_.expectRefusal("large", "size", "640 x 480", send);
 
   // Who listens later learns of it, too.
   const Recorder<PointMatches> late("left/point_matcher/point_matches");
-  EXPECT_TRUE(waitUntil([&] { return late.last() && late.last()->refused && late.last()->goal == "size"; }, send));
+  EXPECT_TRUE(waitUntil([&] { return late.last() && late.last()->refused && late.last()->goal == "damaged"; }, send));
   left_.teach("wall", picture_);
   left_.want("wall", "good");
   EXPECT_TRUE(
       waitUntil([&] { return left_.answersFor("wall", "good") && left_.matches.last()->homography.valid; }, send));
+}
+
+TEST_F(StreamingTest, MatchesAViewOfAnotherSize)
+{
+  cv::Mat larger;
+  cv::resize(picture_, larger, cv::Size(), 1.3, 1.3, cv::INTER_CUBIC);
+  left_.teach("larger", larger);
+  left_.want("larger", "size");
+  EXPECT_TRUE(waitUntil([&] { return left_.answersFor("larger", "size") && left_.matches.last()->homography.valid; },
+                        [&] { left_.send(seen_); }));
 }
 
 TEST_F(StreamingTest, OutlivesWhatACameraShouldNotSend)

@@ -160,7 +160,7 @@ TEST_F(ViewStoreNodeTest, StoresFilesAndImages)
     const GetView::Response view = get(name);
     ASSERT_TRUE(view.success) << view.message;
     EXPECT_EQ(view.image.data, toMono8(picture_).data);
-    EXPECT_FALSE(isCalibrated(view.camera_info));
+    EXPECT_FALSE(toCamera(view.camera_info).calibrated());
     EXPECT_FALSE(view.has_pose);
   }
 }

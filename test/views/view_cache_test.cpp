@@ -34,10 +34,10 @@ TEST_F(ViewCacheTest, ReadsAViewOnce)
 {
   save("desk", 10);
   ViewCache cache{ ViewStore(directory_.path()), PointMatcherParams() };
-  const std::shared_ptr<const PreparedImage> first = cache.get("desk");
+  const std::shared_ptr<const PreparedImage> first = cache.get("desk").image;
   EXPECT_EQ(first->grey().at<uchar>(0, 0), 10);
   EXPECT_EQ(first->region(), cv::Rect(8, 8, 32, 32));
-  EXPECT_EQ(cache.get("desk"), first);
+  EXPECT_EQ(cache.get("desk").image, first);
 }
 
 TEST_F(ViewCacheTest, PreparesViewsAsTold)
@@ -49,16 +49,16 @@ TEST_F(ViewCacheTest, PreparesViewsAsTold)
   LineSegmentParams segments;
   segments.max_segments = 7;
   ViewCache cache{ ViewStore(directory_.path()), { segments, LineFeatureParams() } };
-  EXPECT_EQ(cache.get("wall")->lines().segments().size(), 7U);
+  EXPECT_EQ(cache.get("wall").image->lines().segments().size(), 7U);
 }
 
 TEST_F(ViewCacheTest, ReadsAViewAgainThatWasSavedAnew)
 {
   save("desk", 10);
   ViewCache cache{ ViewStore(directory_.path()), PointMatcherParams() };
-  const std::shared_ptr<const PreparedImage> first = cache.get("desk");
+  const std::shared_ptr<const PreparedImage> first = cache.get("desk").image;
   save("desk", 20);
-  EXPECT_EQ(cache.get("desk")->grey().at<uchar>(0, 0), 20);
+  EXPECT_EQ(cache.get("desk").image->grey().at<uchar>(0, 0), 20);
   EXPECT_EQ(first->grey().at<uchar>(0, 0), 10);
 }
 
@@ -68,12 +68,12 @@ TEST_F(ViewCacheTest, ForgetsTheViewUsedLongestAgo)
   save("b", 2);
   save("c", 3);
   ViewCache cache{ ViewStore(directory_.path()), PointMatcherParams(), 2 };
-  const std::shared_ptr<const PreparedImage> a = cache.get("a");
-  const std::shared_ptr<const PreparedImage> b = cache.get("b");
+  const std::shared_ptr<const PreparedImage> a = cache.get("a").image;
+  const std::shared_ptr<const PreparedImage> b = cache.get("b").image;
   cache.get("a");
   cache.get("c");
-  EXPECT_EQ(cache.get("a"), a);
-  EXPECT_NE(cache.get("b"), b);
+  EXPECT_EQ(cache.get("a").image, a);
+  EXPECT_NE(cache.get("b").image, b);
 }
 
 TEST_F(ViewCacheTest, DoesNotServeAViewThatIsGone)

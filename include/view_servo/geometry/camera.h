@@ -2,6 +2,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include "view_servo/geometry/correspondence.h"
+
 #include <Eigen/Core>
 
 #include <string>
@@ -9,16 +11,24 @@
 
 namespace view_servo
 {
-/** Calibration of a pinhole camera, with the meaning of sensor_msgs/CameraInfo (REP 104). */
+/**
+ * Calibration of a camera, with the meaning of sensor_msgs/CameraInfo (REP 104). Models of the lens:
+ *  - "plumb_bob" (0, 4 or 5 coefficients) and "rational_polynomial" (0, 5, 8, 12 or 14), as OpenCV has them: without
+ *    coefficients, or with zeros alone, the camera is a pinhole;
+ *  - "equidistant" (4 coefficients; none stands for zeros), the fisheye model of Kannala and Brandt (2006), equation 6:
+ *    r = f (t + k1 t^3 + k2 t^5 + k3 t^7 + k4 t^9) at the angle t to the axis. It is no pinhole with zeros either;
+ *  - empty or "none", with zeros alone: a pinhole.
+ */
 struct Camera
 {
   int width = 0;  ///< of the calibrated image [px]
   int height = 0;
-  std::string distortion_model;                 ///< "plumb_bob", "rational_polynomial" or empty: not distorted
+  std::string distortion_model;
   std::vector<double> distortion;               ///< in the order of the model
   Eigen::Matrix3d k = Eigen::Matrix3d::Zero();  ///< intrinsics of the raw image [px]; zero = uncalibrated
-  Eigen::Matrix3d rectification = Eigen::Matrix3d::Identity();
-  Eigen::Matrix<double, 3, 4> projection = Eigen::Matrix<double, 3, 4>::Zero();  ///< of the rectified image [px]
+  Eigen::Matrix3d rectification = Eigen::Matrix3d::Identity();  ///< raw frame -> rectified frame; zero = identity
+  /** Of the rectified image [px]; zero = that of `k`. */
+  Eigen::Matrix<double, 3, 4> projection = Eigen::Matrix<double, 3, 4>::Zero();
 
   bool calibrated() const
   {
@@ -26,16 +36,41 @@ struct Camera
   }
 
   /**
+   * Why the camera cannot be used, naming the field of sensor_msgs/CameraInfo, in one line: it is not calibrated, a number
+   * is not finite, the coefficients do not fit the model, or the model is unknown. Empty when it can be used.
+   */
+  std::string fault() const;
+
+  /** Whether raw images are those of a pinhole, with the camera matrix `k`. Without a fault. */
+  bool isPinhole() const;
+
+  /** The pinhole that rectified images are of; the camera itself when it is one. Without a fault. */
+  Camera rectified() const;
+
+  /** The rotation raw frame -> rectified frame. */
+  Eigen::Matrix3d rectifyingRotation() const
+  {
+    return rectification.isZero(0.0) ? Eigen::Matrix3d(Eigen::Matrix3d::Identity()) : rectification;
+  }
+
+  /**
    * Pixel of the raw image -> point (x, y) on the plane z = 1 of the optical frame, distortion removed.
-   * NaN when the camera is not calibrated and where the distortion has no inverse.
-   * @throws std::invalid_argument for other distortion models.
+   * NaN when the camera is not calibrated, where the distortion has no inverse, and for rays that do not meet that plane.
+   * @throws std::invalid_argument for a distortion that fault() names.
    */
   Eigen::Vector2d normalized(const Eigen::Vector2d& pixel) const;
+  Points normalized(const Points& pixels) const;
+
+  /**
+   * Point (x, y) on the plane z = 1 of the optical frame -> pixel of the raw image, distortion applied. NaN when the camera
+   * is not calibrated. @throws std::invalid_argument for a distortion that fault() names.
+   */
+  Points distorted(const Points& points) const;
 
   /**
    * Point of the optical frame [m], z > 0 -> pixel of the raw image, distortion applied. NaN when the camera is not
    * calibrated and for points that are not in front of it.
-   * @throws std::invalid_argument for other distortion models.
+   * @throws std::invalid_argument for a distortion that fault() names.
    */
   Eigen::Vector2d project(const Eigen::Vector3d& point) const;
 };

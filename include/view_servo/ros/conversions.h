@@ -39,12 +39,6 @@ namespace view_servo
  */
 ros::Time toStamp(double seconds);
 
-/**
- * Whether K has focal lengths (REP 104 has an uncalibrated camera send it all zero) and every number of the calibration
- * is finite.
- */
-bool isCalibrated(const sensor_msgs::CameraInfo& info);
-
 /** Whether two calibrations are the same; headers are not compared. */
 bool sameCalibration(const sensor_msgs::CameraInfo& a, const sensor_msgs::CameraInfo& b);
 

@@ -32,9 +32,6 @@ enum class SourceKind
  */
 SourceKind kindOf(const ImageSource& source, const std::string& name);
 
-/** @throws ImageError when the camera's images have another size than a stored view. */
-void requireSameSize(const std::string& view, const cv::Size& size, const sensor_msgs::Image& image);
-
 /** An image with what its source says about it. */
 struct SourcedImage
 {

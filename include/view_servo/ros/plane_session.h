@@ -2,11 +2,13 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-#include "view_servo/ros/rectifier.h"
+#include "view_servo/geometry/camera_warp.h"
+#include "view_servo/ros/node_base.h"
 #include "view_servo/tracking/plane_finder.h"
 #include "view_servo/tracking/plane_tracker.h"
 #include "view_servo/views/overlay.h"
 #include "view_servo/views/prepared_image.h"
+#include "view_servo/views/view_cache.h"
 
 #include <ros/time.h>
 #include <sensor_msgs/CameraInfo.h>
@@ -23,23 +25,23 @@ namespace view_servo
 {
 /**
  * Follows the plane of a stored view through the images of one camera, with one calibration. The view is searched for
- * in images as they come (PlaneFinder) and tracked in rectified ones (PlaneTracker). Not for several threads at once.
+ * in images as they come (PlaneFinder) and tracked in rectified ones (PlaneTracker). A view of another camera is tracked
+ * as this one would have taken it. Not for several threads at once.
  */
 class PlaneSession
 {
 public:
-  /** @throws what Rectifier and PlaneTracker throw, std::runtime_error when the rectified region is empty. */
-  PlaneSession(std::shared_ptr<const PreparedImage> view, const sensor_msgs::CameraInfo& info,
-               const PlaneTrackerParams& params);
+  /**
+   * @throws std::runtime_error when the view's camera cannot be used (see cameraOf()) or this camera would show nothing of
+   * the view's region, and what CameraWarp and PlaneTracker throw.
+   */
+  PlaneSession(const CachedView& view, const sensor_msgs::CameraInfo& info, const PlaneTrackerParams& params);
 
   /** To be called for each image: whether this one and all before have the calibration that the session began with. */
   bool checkCalibration(const sensor_msgs::CameraInfo& info);
 
-  /**
-   * To be called before each image. When time has gone back, all that was found is forgotten.
-   * @return says by how much time has gone back; empty when it has not.
-   */
-  std::string checkTime(const ros::Time& stamp);
+  /** To be called before each image. When time has gone back, all that was found is forgotten. */
+  StampOrder::Place checkTime(const ros::Time& stamp);
 
   /** The question to PlaneFinder of where the view is in an image. @param raw as it came. */
   PlaneFinder::Question question(const cv::Mat& raw) const;
@@ -58,11 +60,13 @@ private:
 
   PlaneTrackerParams params_;
   std::shared_ptr<const PreparedImage> view_;  // as the camera took it
-  Rectifier rectifier_;
-  cv::Mat reference_;  // without distortion, as all that follows
+  sensor_msgs::CameraInfo info_;               // what the session began with
+  CameraWarp rectification_;
+  CameraWarp view_warp_;  // from the view's camera to the rectified one
+  cv::Mat reference_;     // without distortion, as all that follows
   cv::Rect region_;
   bool calibration_changed_ = false;
-  ros::Time last_stamp_;
+  StampOrder order_;
   cv::Mat last_image_;
   std::unique_ptr<PlaneTracker> tracker_;
   std::optional<Eigen::Matrix3d> last_h_;  // where the plane was tracked last

@@ -210,7 +210,7 @@ private:
     const SourceKind kind = kindOf(source, name);
     if (kind == SourceKind::VIEW)
     {
-      return { views_.get(source.view), std_msgs::Header() };
+      return { views_.get(source.view).image, std_msgs::Header() };
     }
     const SourcedImage image = sources_.read(kind, source, name);
     return { std::make_shared<const PreparedImage>(image.grey, image.region, features_), image.header };
@@ -324,8 +324,7 @@ private:
     MatchLabel label{ frame.image->header, chosen, true };
     try
     {
-      const std::shared_ptr<const PreparedImage> reference = views_.get(chosen.view);
-      requireSameSize(chosen.view, reference->grey().size(), *frame.image);
+      const std::shared_ptr<const PreparedImage> reference = views_.get(chosen.view).image;
       label.refused = false;
       const bool wants_overlay = overlay_publisher_.getNumSubscribers() > 0;
       if (!wants_overlay && matches_publisher_.getNumSubscribers() == 0)

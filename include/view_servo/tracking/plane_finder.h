@@ -27,7 +27,7 @@ public:
   struct Question
   {
     std::shared_ptr<const PreparedImage> view;  ///< prepared with features()
-    cv::Mat image;                              ///< 8-bit, one channel, of the view's size; not written to afterwards
+    cv::Mat image;                              ///< 8-bit, one channel; not written to afterwards
     std::optional<Eigen::Matrix3d> last_h;      ///< where the view was seen last, x_cur ~ H x_ref [px]
   };
 

@@ -13,6 +13,13 @@
 
 namespace view_servo
 {
+/** A stored view, and its image with features. */
+struct CachedView
+{
+  StoredView stored;
+  std::shared_ptr<const PreparedImage> image;
+};
+
 /**
  * Keeps the stored views used last, with their features, so that a view is read and indexed once however many images
  * are matched with it. A view that was saved anew is read again. Safe to use from several threads.
@@ -24,14 +31,13 @@ public:
   ViewCache(ViewStore store, const FeatureParams& params, std::size_t capacity = 4);
 
   /** The stored view with its features. @throws ViewStoreError as ViewStore::load(). */
-  std::shared_ptr<const PreparedImage> get(const std::string& name);
+  CachedView get(const std::string& name);
 
 private:
   struct Entry
   {
-    std::string name;
+    CachedView view;
     std::string revision;
-    std::shared_ptr<const PreparedImage> image;
   };
 
   ViewStore store_;
