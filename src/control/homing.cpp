@@ -2,6 +2,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "view_servo/control/homing.h"
 
+#include "view_servo/geometry/camera_warp.h"
 #include "view_servo/geometry/fundamental.h"
 #include "view_servo/parameters/faults.h"
 
@@ -238,6 +239,8 @@ protected:
         report_.inliers = result.supporting;
         report_.confidence = static_cast<double>(result.supporting) / result.looked_for;
         report_.displacement = result.displacement;
+        clocks_.addImage(stamp, result.pose.yaw);
+        report_.odometry_delay = clocks_.estimate().value_or(report_.odometry_delay);
         follow(stamp, compose(camera, { scale_ * result.pose.x, scale_ * result.pose.y, result.pose.yaw }));
       }
     }
@@ -514,11 +517,19 @@ void Homing::addMatches(double stamp, const Correspondences& pixels, const std::
   {
     return;
   }
+  Points reference;
+  Points current;
+  for (const Correspondence& pair : pixels)
+  {
+    reference.push_back(pair.reference);
+    current.push_back(pair.current);
+  }
+  reference = target_.view_camera.normalized(reference);
+  current = target_.camera.normalized(current);
   HeadingEvidence evidence;
   for (std::size_t i = 0; i < pixels.size(); ++i)
   {
-    const Correspondence pair{ target_.mount.level(target_.camera.normalized(pixels[i].reference)),
-                               target_.mount.level(target_.camera.normalized(pixels[i].current)) };
+    const Correspondence pair{ target_.mount.level(reference[i]), target_.mount.level(current[i]) };
     if (pair.reference.allFinite() && pair.current.allFinite())
     {
       evidence.pairs.push_back(pair);
@@ -542,19 +553,17 @@ void Homing::addImage(double stamp, const cv::Mat& grey)
 std::unique_ptr<Homing> makeHoming(const HomingParams& params, const HomingTarget& target)
 {
   requireNoFaults("parameters of homing", params.validate());
-  if (!target.camera.calibrated())
-  {
-    throw std::invalid_argument("the camera is not calibrated");
-  }
   if (target.image.empty() || target.image.type() != CV_8UC1)
   {
     throw std::invalid_argument("the stored view is not an 8-bit grey image");
   }
+  HomingTarget seen = target;  // as the camera that drives would have taken it
+  seen.image = CameraWarp(target.view_camera, target.camera).image(target.image);
   if (params.mode == HomingMode::THESIS)
   {
-    return std::make_unique<ThesisHoming>(params, target);
+    return std::make_unique<ThesisHoming>(params, seen);
   }
-  return std::make_unique<ServoHoming>(params, target);
+  return std::make_unique<ServoHoming>(params, seen);
 }
 
 }  // namespace view_servo

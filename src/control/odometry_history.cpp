@@ -17,21 +17,24 @@ PlanarPose between(const PlanarPose& from, const PlanarPose& to, double part)
 
 }  // namespace
 
-void OdometryHistory::add(double stamp, const PlanarPose& pose)
+bool OdometryHistory::add(double stamp, const PlanarPose& pose)
 {
   if (!entries_.empty() && stamp <= entries_.back().stamp)
   {
-    if (stamp == entries_.back().stamp)
+    const auto next = std::lower_bound(entries_.begin(), entries_.end(), stamp,
+                                       [](const Entry& entry, double time) { return entry.stamp < time; });
+    if (next->stamp != stamp && next != entries_.begin())
     {
-      return;
+      entries_.insert(next, { stamp, pose });
     }
-    entries_.clear();
+    return false;
   }
   entries_.push_back({ stamp, pose });
   while (entries_.front().stamp < stamp - duration_)
   {
     entries_.pop_front();
   }
+  return true;
 }
 
 std::optional<PlanarPose> OdometryHistory::at(double stamp, double reach) const

@@ -11,6 +11,7 @@
 #include "view_servo/ros/driver_node.h"
 #include "view_servo/ros/homing_worker.h"
 #include "view_servo/ros/image_source.h"
+#include "view_servo/ros/odometry_input.h"
 #include "view_servo/ros/transform_source.h"
 #include "view_servo/ros/view_answer.h"
 #include "view_servo/views/view_store.h"
@@ -62,17 +63,18 @@ public:
 
   HomingDriver(DriverContext& context, const Params& params)
     : context_(context),
-      params_(params),
+      params_(withPlainFrame(params)),
       images_(context.addInput("image", context.quoted("image_raw"), params.image_timeout)),
       outcomes_(context.addInput("image that was worked on", context.quoted("image_raw"),
                                  OUTCOME_PATIENCE * params.image_timeout)),
-      odometry_(context.addInput("odometry", context.quoted("odom"), params.odometry_timeout)),
+      odometry_(context, transforms_, params_.base_frame, params.odometry_timeout, params.odometry_delay,
+                [this](const nav_msgs::Odometry& message) { onOdometry(message); }),
       matches_(context.addInput("matches", context.quoted("point_matches") + " or " + context.quoted("line_matches"),
                                 params.match_timeout)),
       points_("matches", context.resolved("point_matches")),
       lines_("matches", context.resolved("line_matches")),
       store_(viewsDir(params.views_dir)),
-      output_(context.nodeHandle(), context.commandTopic(), params.base_frame),
+      output_(context.nodeHandle(), context.commandTopic(), params_.base_frame),
       worker_(
           context.resolved("image_raw"),
           [this](const HomingOutcome& outcome) {
@@ -88,7 +90,6 @@ public:
   {
     context.diagnostics().add("camera", &camera_, &CameraInput::diagnose);
     want(params_.view, "");
-    context.listen<nav_msgs::Odometry>("odom", 50, [this](const nav_msgs::Odometry::ConstPtr& m) { onOdometry(*m); });
     context.listen<PointMatches>("point_matches", 1, [this](const PointMatches::ConstPtr& m) {
       onMatches(points_.add(*m), m->header, m->matches);
     });
@@ -209,10 +210,21 @@ public:
   {
     status.add("View", points_.view());
     status.add("Inliers", report_.inliers);
+    status.add("Odometry delay [s]", odometry_.measuredDelay());
+    if (const std::string advice = odometry_.adviceOnDelay(); !advice.empty())
+    {
+      status.mergeSummary(diagnostic_msgs::DiagnosticStatus::WARN, advice);
+    }
   }
 
 private:
   using Clock = std::chrono::steady_clock;
+
+  static Params withPlainFrame(Params params)
+  {
+    params.base_frame = withoutSlash(params.base_frame);
+    return params;
+  }
 
   void want(const std::string& view, const std::string& goal)
   {
@@ -235,11 +247,12 @@ private:
 
   std::string odometryLacks() const
   {
-    if (base_in_odom_ && odometry_.age() <= params_.odometry_timeout)
+    const DriverInput& odometry = odometry_.input();
+    if (base_in_odom_ && odometry.age() <= params_.odometry_timeout)
     {
-      return stampsApart(odometry_, images_);
+      return stampsApart(odometry, images_);
     }
-    return odometry_.problem().empty() ? "no odometry has come on " + odometry_.topics() : odometry_.problem();
+    return odometry.problem().empty() ? "no odometry has come on " + odometry.topics() : odometry.problem();
   }
 
   std::shared_ptr<HomingTask> makeTask(const StoredView& stored, const CameraFrame& frame,
@@ -248,7 +261,7 @@ private:
     HomingTarget target;
     target.image = stored.image;
     target.camera = toCamera(*frame.info);
-    requireSize(stored, { target.camera.width, target.camera.height });
+    target.view_camera = cameraOf(stored, target.camera);
     target.mount = CameraMount(
         toIsometry(transforms_.lookUp(params_.base_frame, frame.image->header.frame_id, ros::Time(0), 0.0).transform));
     return std::make_shared<HomingTask>(HomingTask{ stored.name, frame.info, makeHoming(params, target) });
@@ -256,21 +269,20 @@ private:
 
   // ------------------------------------------------------------------------------------------------------- inputs
 
-  /** Whether a stamp can be used. Time that goes back ends the goal. */
-  bool checkStamp(DriverInput& input, const ros::Time& stamp)
+  void endIfTimeWentBack(const DriverInput& input)
   {
-    const bool usable = input.checkStamp(stamp);
     if (!input.jump().empty())
     {
       context_.abort(input.jump());
       setTask(nullptr);
     }
-    return usable;
   }
 
   void onFrame(const CameraFrame& frame)
   {
-    if (!checkStamp(images_, frame.image->header.stamp))
+    const DriverInput::Stamp place = images_.checkStamp(frame.image->header.stamp);
+    endIfTimeWentBack(images_);
+    if (place != DriverInput::Stamp::NEWEST)
     {
       return;
     }
@@ -280,7 +292,7 @@ private:
       context_.abort("the camera's calibration has changed");
       setTask(nullptr);
     }
-    const std::string apart = stampsApart(odometry_, images_);
+    const std::string apart = stampsApart(odometry_.input(), images_);
     odd_stamps_ = apart.empty() ? 0 : odd_stamps_ + 1;
     if (odd_stamps_ >= ODD_STAMPS)
     {
@@ -291,27 +303,18 @@ private:
 
   void onOdometry(const nav_msgs::Odometry& message)
   {
-    const PlanarPose pose = toPlanarPose(message);
-    constexpr double FARTHEST = 1e6;  // [m]
-    if (!(std::hypot(pose.x, pose.y) < FARTHEST && std::isfinite(pose.yaw)))
-    {
-      odometry_.reject("odometry on " + odometry_.topics() + " is no pose within 1000 km");
-      return;
-    }
-    if (!message.child_frame_id.empty() && message.child_frame_id != params_.base_frame)
-    {
-      odometry_.reject("odometry on " + odometry_.topics() + " is of '" + message.child_frame_id +
-                       "', ~base_frame is '" + params_.base_frame + "'");
-      return;
-    }
-    if (!checkStamp(odometry_, message.header.stamp))
+    const std::optional<OdometryReading> reading = odometry_.read(message);
+    endIfTimeWentBack(odometry_.input());
+    if (!reading)
     {
       return;
     }
-    odometry_.accept();
-    travelled_ += base_in_odom_ ? compose(inverse(*base_in_odom_), pose).distance() : 0.0;
-    base_in_odom_ = pose;
-    worker_.addOdometry(message.header.stamp.toSec(), pose);
+    worker_.addOdometry(reading->time, reading->pose);
+    if (reading->place == DriverInput::Stamp::NEWEST)
+    {
+      travelled_ += base_in_odom_ ? compose(inverse(*base_in_odom_), reading->pose).distance() : 0.0;
+      base_in_odom_ = reading->pose;
+    }
   }
 
   void onMatches(bool wanted, const std_msgs::Header& header, const std::vector<PointMatch>& matches)
@@ -342,6 +345,11 @@ private:
     }
     report_ = outcome.report;
     course_ = outcome.course;
+    odometry_.setRemainingDelay(report_.odometry_delay);
+    if (const std::string advice = odometry_.adviceOnDelay(); !advice.empty())
+    {
+      ROS_WARN_STREAM_THROTTLE(10.0, advice);
+    }
     if (!outcome.frame_time)
     {
       return;
@@ -381,20 +389,20 @@ private:
     }
   }
 
-  static constexpr int ODD_STAMPS = 2;             // images in a row whose stamps are apart from odometry's
+  static constexpr int ODD_STAMPS = 3;             // images in a row whose stamps are apart from odometry's
   static constexpr double OUTCOME_PATIENCE = 4.0;  // times ~image_timeout
 
   DriverContext& context_;
   const Params params_;
   DriverInput& images_;
   DriverInput& outcomes_;
-  DriverInput& odometry_;
+  TransformSource transforms_;
+  OdometryInput odometry_;
   DriverInput& matches_;
   ViewAnswer points_;
   ViewAnswer lines_;
   const ViewStore store_;
   const BaseOutput output_;
-  TransformSource transforms_;
 
   std::shared_ptr<HomingTask> task_;  // the newest
   HomingReport report_;

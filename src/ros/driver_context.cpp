@@ -9,7 +9,7 @@
 
 namespace view_servo
 {
-bool DriverInput::checkStamp(const ros::Time& stamp)
+DriverInput::Stamp DriverInput::checkStamp(const ros::Time& stamp)
 {
   constexpr double MAX_AHEAD = 600.0;  // of ROS' clock: clocks may be apart, but no clock says more [s]
   jump_.clear();
@@ -17,21 +17,31 @@ bool DriverInput::checkStamp(const ros::Time& stamp)
   if (stamp.isZero())
   {
     reject(name + ": no stamp, it is all zero");
-    return false;
+    return Stamp::UNUSABLE;
   }
   const double ahead = -ageOf(stamp);
   if (ahead > MAX_AHEAD)
   {
     reject(name + ": stamped " + seconds(ahead) + " in the future");
-    return false;
+    return Stamp::UNUSABLE;
   }
-  if (stamp == last_stamp_)
+  switch (order_.check(stamp))
   {
-    reject(name + ": stamps stand still");
-    return false;
+    case StampOrder::REPEATED:
+      reject(name + ": stamps stand still");
+      return Stamp::UNUSABLE;
+    case StampOrder::FAR_LATE:
+      reject(name + ": a message is stamped " + seconds(order_.behind()) + " before another that came earlier");
+      return Stamp::UNUSABLE;
+    case StampOrder::LATE:
+      return Stamp::LATE;
+    case StampOrder::GONE_BACK:
+      jump_ = "time has gone back by " + seconds(order_.behind()) + " in " + name;
+      break;
+    case StampOrder::NEWEST:
+      break;
   }
-  jump_ = timeJump(last_stamp_, stamp, name);
-  return true;
+  return Stamp::NEWEST;
 }
 
 std::string DriverInput::missing() const
@@ -45,16 +55,16 @@ std::string DriverInput::missing() const
 
 std::string stampsApart(const DriverInput& odometry, const DriverInput& images)
 {
-  constexpr double MAX_AHEAD = 1.0;   // of odometry [s]
-  constexpr double MAX_BEHIND = 0.5;  // [s]
-  const double ahead = secondsBetween(images.lastStamp(), odometry.lastStamp());
-  const bool known = !images.lastStamp().isZero() && !odometry.lastStamp().isZero();
-  if (!known || (ahead < MAX_AHEAD && ahead > -MAX_BEHIND))
+  constexpr double FAR = 0.45;  // more than images take to come, and homing can bear [s]
+  const double ahead = secondsBetween(images.newestStamp(), odometry.newestStamp());
+  const bool known = !images.newestStamp().isZero() && !odometry.newestStamp().isZero();
+  if (!known || std::abs(ahead) < FAR)
   {
     return "";
   }
   return "odometry on " + odometry.topics() + " is stamped " + seconds(std::abs(ahead)) +
-         (ahead > 0.0 ? " after" : " before") + " the images on " + images.topics() + ": their clocks are apart";
+         (ahead > 0.0 ? " after" : " before") + " the images on " + images.topics() +
+         ": their clocks are apart, or one comes late";
 }
 
 DriverContext::DriverContext(const ros::NodeHandle& nh, const ros::NodeHandle& private_nh, bool dry_run)

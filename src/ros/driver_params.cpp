@@ -23,6 +23,8 @@ std::vector<Parameter> rowsOfHomingDriver(HomingDriverParams& params)
     real("image_timeout", params.image_timeout, "s", "> 0", "the base stands when no image has come for so long"),
     real("odometry_timeout", params.odometry_timeout, "s", "> 0",
          "the base stands when no odometry has come for so long"),
+    real("odometry_delay", params.odometry_delay, "s", "[-2, 2]",
+         "how much later than images of the same moment odometry is stamped: it is taken away from odometry's stamps"),
     real("match_timeout", params.match_timeout, "s", "> 0",
          "the base stands when neither kind of matches has come for so long, though it needs them"),
   };

@@ -83,11 +83,33 @@ void ExitDeadline::watch(const std::function<bool()>& asked)
   }
 }
 
-std::string timeJump(ros::Time& last, const ros::Time& stamp, const std::string& what)
+StampOrder::Place StampOrder::check(const ros::Time& stamp)
 {
-  constexpr double TOLERANCE = 0.5;  // [s]
-  const double back = secondsBetween(stamp, std::exchange(last, stamp));
-  return back > TOLERANCE ? "time has gone back by " + seconds(back) + " in " + what : "";
+  constexpr double FAR = 0.5;  // [s]
+  constexpr int OFTEN = 3;     // two publishers take turns; three in a row are no chance
+  behind_ = secondsBetween(stamp, newest_);
+  if (newest_.isZero() || stamp > newest_)
+  {
+    newest_ = stamp;
+    far_late_ = 0;
+    return NEWEST;
+  }
+  if (stamp == newest_)
+  {
+    return REPEATED;
+  }
+  if (behind_ <= FAR)
+  {
+    far_late_ = 0;
+    return LATE;
+  }
+  if (++far_late_ < OFTEN)
+  {
+    return FAR_LATE;
+  }
+  newest_ = stamp;
+  far_late_ = 0;
+  return GONE_BACK;
 }
 
 void keepFreedMemory()

@@ -11,16 +11,25 @@
 
 namespace view_servo
 {
+std::string withoutSlash(const std::string& frame)
+{
+  return frame.substr(!frame.empty() && frame.front() == '/' ? 1 : 0);
+}
+
 TransformSource::TransformSource() : listener_(buffer_)
 {
 }
 
 std::string TransformSource::missing(const std::string& target, const std::string& source, const ros::Time& stamp) const
 {
+  if (target.empty() || source.empty())
+  {
+    return "tf cannot place a message whose frame_id is empty";
+  }
   std::string error;
   try
   {
-    if (buffer_.canTransform(target, source, stamp, &error))
+    if (buffer_.canTransform(withoutSlash(target), withoutSlash(source), stamp, &error))
     {
       return "";
     }
@@ -44,7 +53,7 @@ geometry_msgs::TransformStamped TransformSource::lookUp(const std::string& targe
   }
   try
   {
-    return buffer_.lookupTransform(target, source, stamp);
+    return buffer_.lookupTransform(withoutSlash(target), withoutSlash(source), stamp);
   }
   catch (const tf2::TransformException& exception)
   {

@@ -143,9 +143,7 @@ public:
       parts_(parts),
       on_step_(on_step),
       nomad_(nomadAt(world, params, start)),
-      homing_(makeHoming(params.homing, { parts.reference->grey(),
-                                          withFocalLengthError(world.camera, params.conditions.focal_length_error),
-                                          CameraMount(world.camera_on_base) })),
+      homing_(makeHoming(params.homing, targetOf(world, params, parts))),
       limiter_(params.limits),
       odometry_due_(ODOMETRY_PERIOD),
       control_due_(CONTROL_PERIOD),
@@ -156,13 +154,22 @@ public:
   {
   }
 
+  static HomingTarget targetOf(const World& world, const HomingTrialParams& params, const Parts& parts)
+  {
+    HomingTarget target;
+    target.image = parts.reference->grey();
+    target.camera = target.view_camera = withFocalLengthError(world.camera, params.conditions.focal_length_error);
+    target.mount = CameraMount(world.camera_on_base);
+    return target;
+  }
+
   HomingOutcome run()
   {
     for (time_ = 0.0; time_ < params_.max_duration && (!end_ || time_ < *end_ + SETTLING); time_ += STEP)
     {
       if (odometry_due_.due(time_))
       {
-        homing_->addOdometry(time_, toPlanar(nomad_.odometry()));
+        homing_->addOdometry(time_ + params_.conditions.odometry_delay, toPlanar(nomad_.odometry()));
       }
       if (!end_ && image_due_.due(time_))
       {

@@ -24,6 +24,7 @@ struct HomingConditions
   double light_gain = 1.0;          ///< factor of the light under which the view was stored
   double focal_length_error = 0.0;  ///< by which part the calibration has focal lengths too long
   double occluded_from = -1.0;      ///< when a person begins to walk by, which takes 2 s [s]; negative: never
+  double odometry_delay = 0.0;      ///< by which odometry is stamped later than images of the same moment [s]
 };
 
 struct HomingTrialParams

@@ -53,6 +53,7 @@ public:
     target_.camera.width = WIDTH;
     target_.camera.height = HEIGHT;
     target_.camera.k << 260.0, 0.0, 159.5, 0.0, 260.0, 119.5, 0.0, 0.0, 1.0;
+    target_.view_camera = target_.camera;
     target_.mount = CameraMount(mounted(camera_on_base));
     Rng rng(1);
     for (int i = 0; i < 200; ++i)

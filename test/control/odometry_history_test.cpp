@@ -86,15 +86,18 @@ TEST(OdometryHistory, ForgetsWhatIsOld)
   expectPose(history.at(102.0), 0.2, -0.5, 0.4);
 }
 
-TEST(OdometryHistory, ForgetsAllWhenTimeGoesBack)
+TEST(OdometryHistory, SortsInWhatComesLate)
 {
-  OdometryHistory history = drive();
-  history.add(50.0, { 7.0, 8.0, 0.0 });
-  EXPECT_FALSE(history.at(101.0).has_value());
-  expectPose(history.at(50.0), 7.0, 8.0, 0.0);
-  expectPose(history.newest(), 7.0, 8.0, 0.0);
-  history.add(51.0, { 8.0, 8.0, 0.0 });
-  expectPose(history.at(50.5), 7.5, 8.0, 0.0);
+  OdometryHistory history(10.0);
+  EXPECT_TRUE(history.add(100.0, { 0.0, 0.0, 0.0 }));
+  EXPECT_TRUE(history.add(100.4, { 0.4, 0.0, 0.0 }));
+  EXPECT_FALSE(history.add(100.2, { 0.1, 0.0, 0.0 }));
+  expectPose(history.at(100.1), 0.05, 0.0, 0.0);
+  expectPose(history.at(100.3), 0.25, 0.0, 0.0);
+  expectPose(history.newest(), 0.4, 0.0, 0.0);
+  EXPECT_FALSE(history.add(99.0, { 9.0, 9.0, 0.0 }));  // older than all
+  EXPECT_FALSE(history.at(99.5).has_value());
+  expectPose(history.at(100.1), 0.05, 0.0, 0.0);
 }
 
 TEST(OdometryHistory, TheSameStampTwiceIsNoHarm)
@@ -104,14 +107,6 @@ TEST(OdometryHistory, TheSameStampTwiceIsNoHarm)
   expectPose(history.at(102.0), 0.2, -0.5, 0.4);
   expectPose(history.at(101.0), 0.1, -0.5, 0.2);
   expectPose(history.at(102.1), 0.21, -0.5, 0.42);
-}
-
-TEST(OdometryHistory, ClearForgets)
-{
-  OdometryHistory history = drive();
-  history.clear();
-  EXPECT_FALSE(history.at(101.0).has_value());
-  EXPECT_FALSE(history.newest().has_value());
 }
 
 }  // namespace view_servo

@@ -139,6 +139,22 @@ public:
     images_.publish(image);
   }
 
+  /** tf learns where base_link is on another frame. */
+  void placeBaseOn(const std::string& frame)
+  {
+    broadcaster_.sendTransform(
+        sim::toTransform(Eigen::Isometry3d::Identity(), frame, sim::BASE_FRAME, ros::Time::now()));
+  }
+
+  /** Of odometry, and of images; with slashes as old nodes have them. */
+  void setFrames(const std::string& odometry_child, const std::string& camera_frame)
+  {
+    const std::lock_guard<std::mutex> lock(publisher_mutex_);
+    odometry_child_ = odometry_child;
+    camera_frame_ = camera_frame;
+  }
+
+  std::atomic<bool> shuffles{ false };         // every third odometry message comes 0.05 s late, every 20th 0.8 s
   std::atomic<bool> moves_odometry{ true };    // publishes it
   std::atomic<double> odometry_offset{ 0.0 };  // of its stamps against the images' [s]
   std::atomic<bool> black{ false };
@@ -151,7 +167,10 @@ private:
     const std::lock_guard<std::mutex> lock(publisher_mutex_);
     if (moves_odometry)
     {
-      odometry_.publish(odometry(time.isZero() ? time : time + ros::Duration(odometry_offset)));
+      const double late = !shuffles ? 0.0 : cycle % 20 == 0 ? 0.8 : cycle % 3 == 0 ? 0.05 : 0.0;
+      nav_msgs::Odometry message = odometry(time.isZero() ? time : time + ros::Duration(odometry_offset - late));
+      message.child_frame_id = odometry_child_;
+      odometry_.publish(message);
     }
     if (cycle % IMAGE_EVERY != 0)
     {
@@ -159,6 +178,7 @@ private:
     }
     sensor_msgs::CameraInfo info = sim::toCameraInfo(scene().world, 0.0, time);
     info.K[0] = info.K[4] = info.P[0] = info.P[5] = calibrated ? focal_length.load() : 0.0;
+    info.header.frame_id = camera_frame_;
     if (camera)
     {
       const cv::Mat image = black ? cv::Mat(scene().image.size(), CV_8UC1, cv::Scalar(0)) : scene().image;
@@ -202,6 +222,8 @@ private:
   }
 
   std::mutex publisher_mutex_;
+  std::string odometry_child_ = sim::BASE_FRAME;
+  std::string camera_frame_ = sim::CAMERA_FRAME;
   ros::Publisher images_;
   ros::Publisher infos_;
   ros::Publisher odometry_;
@@ -266,6 +288,59 @@ TEST_F(HomingTest, RefusesAndStopsForOdometryOfAnotherTime)
   EXPECT_TRUE(waitUntil([this] { return reason().find("their clocks are apart") != std::string::npos; })) << reason();
   EXPECT_LT(commands_.lastMotionAfter(moment), 0.0);
   expectToEnd([this] { robot_.odometry_offset = 0.0; }, GoalState::ABORTED, "gone back");
+}
+
+TEST_F(HomingTest, DrivesThoughOdometryComesInTheWrongOrder)
+{
+  robot_.shuffles = true;
+  drive();
+  const Clock::time_point moment = Clock::now();
+  constexpr double LONG = 3.0;  // than any patience with an input [s]
+  EXPECT_TRUE(waitUntil([&] { return commands_.lastMotionAfter(moment) > LONG; })) << reason();
+  EXPECT_EQ(client_.getState().state_, GoalState::ACTIVE) << reason();
+}
+
+TEST_F(HomingTest, StopsForOdometryOfTwoNodes)
+{
+  drive();
+  const TemporaryDirectory directory;
+  const std::string topic = ns_ + "/odom";
+  std::unique_ptr<ChildProcess> other;
+  const auto publish = [&] {
+    other = std::make_unique<ChildProcess>(
+        std::vector<std::string>{ "rostopic", "pub", "-r", "5", "/" + topic, "nav_msgs/Odometry", "{}" },
+        directory.path() / "output");
+  };
+  publish();
+  EXPECT_TRUE(waitUntil([this] { return reason().find("2 nodes publish odometry on") != std::string::npos; }))
+      << reason();
+  EXPECT_TRUE(waitUntil([this] { return !commands_.moving(); }));
+  other->interrupt();
+  other.reset();
+  expectToGoOn();
+}
+
+TEST_F(HomingTest, UsesOdometryOfAFrameThatTfKnows)
+{
+  drive();
+  expectToStop([this] { robot_.setFrames("base_footprint", sim::CAMERA_FRAME); }, ServoStatus::LOST,
+               "is of 'base_footprint', ~base_frame is 'base_link'");
+  robot_.placeBaseOn("base_footprint");
+  expectToGoOn();
+}
+
+TEST_F(HomingTest, KnowsFramesWithASlash)
+{
+  robot_.setFrames(std::string("/") + sim::BASE_FRAME, std::string("/") + sim::CAMERA_FRAME);
+  drive();
+}
+
+TEST_F(HomingTest, SaysThatImagesHaveNoFrame)
+{
+  robot_.setFrames(sim::BASE_FRAME, "");
+  send("goal");
+  EXPECT_TRUE(waitUntil([this] { return reason().find("frame_id is empty") != std::string::npos; })) << reason();
+  EXPECT_FALSE(commands_.moving());
 }
 
 TEST_F(HomingTest, StopsWhenTheImageTurnsBlackAndGoesOnAfterwards)

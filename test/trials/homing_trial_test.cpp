@@ -13,6 +13,7 @@
 #include <cmath>
 #include <stdexcept>
 #include <string>
+#include <utility>
 #include <vector>
 
 namespace view_servo::sim
@@ -110,6 +111,42 @@ TEST(HomingTrial, ArrivesFromNearTheViewWithoutDrivingAway)
     expectArrival(outcome, 0.02, 1.0 * DEGREE);
     EXPECT_LT(furthest, 0.07);
     EXPECT_LT(outcome.travelled, 0.15);
+  }
+}
+
+TEST(HomingTrial, FindsHowFarTheClocksOfOdometryAndCameraAreApart)
+{
+  const World world = worldOf("desk");
+  for (const double delay : { 0.0, 0.05, 0.1, 0.2, -0.1 })
+  {
+    HomingTrialParams params;
+    params.conditions.odometry_delay = delay;
+    HomingTrials trials(world, params);
+    double found = NAN;
+    const HomingOutcome outcome = trials.run(fromGoal(world, { -0.9, 0.3, 12.0 * DEGREE }),
+                                             [&](const HomingStep& step) { found = step.report.odometry_delay; });
+    SCOPED_TRACE(delay);
+    expectArrival(outcome, 0.02, 1.0 * DEGREE);
+    EXPECT_NEAR(found, delay, 0.02);
+  }
+}
+
+TEST(HomingTrial, ArrivesThroughLensesThatBend)
+{
+  const std::pair<const char*, std::vector<double>> lenses[] = {
+    { "equidistant", { 0.0, 0.0, 0.0, 0.0 } },
+    { "equidistant", { 0.03, -0.006, 0.001, 0.0 } },
+    { "rational_polynomial", { 0.3, -0.05, 0.0005, -0.0004, 0.0, 0.5, -0.02, 0.0 } },
+    { "plumb_bob", { -0.25, 0.06, 0.001, -0.0005, 0.0 } },
+  };
+  for (const auto& [model, coefficients] : lenses)
+  {
+    World world = worldOf("desk");
+    world.camera.distortion_model = model;
+    world.camera.distortion = coefficients;
+    HomingTrials trials(world, HomingTrialParams());
+    SCOPED_TRACE(model);
+    expectArrival(trials.run(fromGoal(world, { -0.8, 0.25, 5.0 * DEGREE })), 0.01, 0.5 * DEGREE);
   }
 }
 

@@ -3,6 +3,7 @@
 #pragma once
 
 #include "view_servo/control/arrival_detector.h"
+#include "view_servo/control/clock_offset.h"
 #include "view_servo/control/course.h"
 #include "view_servo/control/goal_rules.h"
 #include "view_servo/control/heading_hypotheses.h"
@@ -93,6 +94,8 @@ struct HomingReport
   double displacement = std::numeric_limits<
       double>::quiet_NaN();  ///< median distance of the view's points from their places in the view [px]
   int inliers = 0;
+  /** How much later than images odometry is stamped; see ClockOffset [s]. */
+  double odometry_delay = std::numeric_limits<double>::quiet_NaN();
 };
 
 /** How far a goal has come. */
@@ -101,8 +104,9 @@ Progress toProgress(const HomingReport& report);
 /** What homing goes back to. */
 struct HomingTarget
 {
-  cv::Mat image;  ///< 8-bit, one channel
-  Camera camera;  ///< calibrated; of the stored and the current images
+  cv::Mat image;       ///< 8-bit, one channel
+  Camera camera;       ///< without a fault; of the current images
+  Camera view_camera;  ///< the same of `image`
   CameraMount mount;
 };
 
@@ -117,20 +121,23 @@ public:
   Homing(const Homing&) = delete;
   Homing& operator=(const Homing&) = delete;
 
-  /** Pose of the base in odometry's frame. */
+  /** Pose of the base in odometry's frame; it may come late. */
   void addOdometry(double stamp, const PlanarPose& base_in_odom)
   {
-    odometry_.add(stamp, base_in_odom);
-    onOdometry(base_in_odom);
+    if (odometry_.add(stamp, base_in_odom))
+    {
+      clocks_.addOdometry(stamp, base_in_odom.yaw);
+      onOdometry(base_in_odom);
+    }
   }
 
   /**
-   * Matches of an image, in pixels of the raw images, with a weight each. They may come after newer images, and from
-   * several matchers in turn.
+   * Matches of an image, in pixels of the raw images (`reference` is in the stored one), with a weight each. They may come
+   * after newer images, and from several matchers in turn.
    */
   void addMatches(double stamp, const Correspondences& pixels, const std::vector<double>& weights);
 
-  /** @param grey 8-bit, one channel. @throws std::invalid_argument when it has another size than the stored view. */
+  /** @param grey 8-bit, one channel. @throws std::invalid_argument when it has another size than the camera. */
   void addImage(double stamp, const cv::Mat& grey);
 
   /** Where to go by all that has been added; STAND while that is not known. */
@@ -170,6 +177,7 @@ protected:
   HomingParams params_;
   HomingTarget target_;
   OdometryHistory odometry_;
+  ClockOffset clocks_;
   HomingReport report_;
   double started_;     ///< stamp of the first image; NaN before it
   double last_trace_;  ///< stamp of the last image or matches that showed the view

@@ -18,8 +18,11 @@ public:
   {
   }
 
-  /** Pose of the base in odometry's frame. When time has gone back, all poses before are forgotten. */
-  void add(double stamp, const PlanarPose& pose);
+  /**
+   * Pose of the base in odometry's frame. One that comes late is sorted in, unless it is older than all that is kept.
+   * @return whether it is the newest.
+   */
+  bool add(double stamp, const PlanarPose& pose);
 
   /**
    * The pose at a time, interpolated; up to `reach` [s] after the newest one it is extrapolated. Empty where nothing is
@@ -28,11 +31,6 @@ public:
   std::optional<PlanarPose> at(double stamp, double reach = 0.2) const;
 
   std::optional<PlanarPose> newest() const;
-
-  void clear()
-  {
-    entries_.clear();
-  }
 
 private:
   struct Entry

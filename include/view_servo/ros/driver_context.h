@@ -52,20 +52,26 @@ public:
   {
     problem_ = problem;
   }
+  enum class Stamp
+  {
+    NEWEST,
+    LATE,     ///< a newer one has come before
+    UNUSABLE  ///< zero, far in the future, the same as before, or far behind: reject() was called
+  };
   /**
-   * Checks the stamp of what has come: when it is zero, far in the future or the same as before, calls reject() and
-   * returns false. When it has gone back, as when a bag loops, jump() says so afterwards.
+   * Checks the stamp of what has come. When time has gone back, as when a bag loops, jump() says so afterwards and the stamp
+   * is the newest.
    */
-  bool checkStamp(const ros::Time& stamp);
-  /** Says by how much the stamp checked last has gone back; empty when it has not. */
+  Stamp checkStamp(const ros::Time& stamp);
+  /** Says by how much time has gone back with the stamp checked last; empty when it has not. */
   const std::string& jump() const
   {
     return jump_;
   }
-  /** The last stamp that could be used. */
-  const ros::Time& lastStamp() const
+  /** The newest stamp that could be used; zero without any. */
+  const ros::Time& newestStamp() const
   {
-    return last_stamp_;
+    return order_.newest();
   }
   /** To be called when a goal begins: the time without input counts from now. */
   void restart()
@@ -106,15 +112,12 @@ private:
   InputWatch watch_;
   std::string problem_;
   std::string jump_;
-  ros::Time last_stamp_;
+  StampOrder order_;
   bool came_ = false;
   bool needed_ = true;
 };
 
-/**
- * Says how far the stamps of odometry and images are apart when this is too far to use them together; else empty. More
- * is allowed for images that are late than for odometry that is.
- */
+/** Says how far the newest stamps of odometry and images are apart when this is too far to use them together; else empty. */
 std::string stampsApart(const DriverInput& odometry, const DriverInput& images);
 
 /**
@@ -154,9 +157,12 @@ public:
     return gate_.dryRun() ? "cmd_vel_dry" : "cmd_vel";
   }
 
-  /** Subscribes. @param handler is called with a const Message::ConstPtr&, by runLocked(). */
+  /**
+   * Subscribes. @param handler is called with a const Message::ConstPtr&, by runLocked(). @return the subscriber, which the
+   * node keeps.
+   */
   template <typename Message, typename Handler>
-  void listen(const std::string& topic, std::uint32_t queue_size, Handler handler)
+  ros::Subscriber listen(const std::string& topic, std::uint32_t queue_size, Handler handler)
   {
     const std::string what = "a message on '" + resolved(topic) + "'";
     subscribers_.push_back(subscribe<Message>(
@@ -165,6 +171,7 @@ public:
           runLocked(what, [&] { handler(message); });
         },
         ros::TransportHints().tcpNoDelay()));
+    return subscribers_.back();
   }
 
   /**

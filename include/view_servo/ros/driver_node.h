@@ -346,7 +346,9 @@ private:
   void cycle()
   {
     const ros::Time now = ros::Time::now();
-    const std::string jump = timeJump(last_now_, now, "the clock");
+    constexpr double CLOCK_STEP = 0.5;  // back, that a clock makes by itself at most [s]
+    const double back = secondsBetween(now, std::exchange(last_now_, now));
+    const std::string jump = back > CLOCK_STEP ? "time has gone back by " + seconds(back) + " in the clock" : "";
     std::optional<Handle> next = takeNewGoal();
     replaced_ = next.has_value();
     if (goal_)

@@ -37,6 +37,7 @@ struct HomingDriverParams
   std::string base_frame = "base_link";
   double image_timeout = 0.25;
   double odometry_timeout = 0.25;
+  double odometry_delay = 0.0;
   double match_timeout = 0.25;
   HomingParams homing;
   VelocityLimits limits;

@@ -37,11 +37,40 @@ double secondsBetween(const ros::Time& from, const ros::Time& to);
 double ageOf(const ros::Time& stamp);
 
 /**
- * Says so when time has gone back from one stamp to the next, as when a bag loops; else empty. A small step back does
- * not count, because messages may overtake each other.
- * @param last stamp before, is set to `stamp`. @param what has the stamps, for the text.
+ * The order of the stamps of one input. A message may overtake another one, and is late then; but when one after the other
+ * is far behind, time itself has gone back, as when a bag loops or a simulation begins anew.
  */
-std::string timeJump(ros::Time& last, const ros::Time& stamp, const std::string& what);
+class StampOrder
+{
+public:
+  enum Place
+  {
+    NEWEST,
+    REPEATED,  ///< the newest stamp again
+    LATE,      ///< before the newest
+    FAR_LATE,  ///< so long before the newest that it belongs to nothing that is known
+    GONE_BACK  ///< time has gone back: what was before is to be forgotten, and this stamp is the newest
+  };
+
+  /** Where a stamp is in the order. */
+  Place check(const ros::Time& stamp);
+
+  /** The newest stamp; zero without any. */
+  const ros::Time& newest() const
+  {
+    return newest_;
+  }
+  /** How far the last stamp was behind the newest one before it [s]. */
+  double behind() const
+  {
+    return behind_;
+  }
+
+private:
+  ros::Time newest_;
+  double behind_ = 0.0;
+  int far_late_ = 0;  // in a row
+};
 
 /**
  * Runs `body` and catches and logs what it throws, so that no message, timer or thread ends the node.

@@ -12,8 +12,11 @@
 
 namespace view_servo
 {
+/** The name of a frame as tf2 knows it: older nodes put a slash before it. */
+std::string withoutSlash(const std::string& frame);
+
 /**
- * Looks transforms up in tf. Waits are by a steady clock; tf2's own timeouts are on the clock of ROS, and do not end
+ * Looks transforms up in tf. Frames may have a slash before their names. Waits are by a steady clock; tf2's own timeouts are on the clock of ROS, and do not end
  * while that stands still. Safe to use from several threads.
  */
 class TransformSource

@@ -1,0 +1,45 @@
+// Copyright (c) 2026, the view_servo authors
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <deque>
+#include <optional>
+
+namespace view_servo
+{
+/**
+ * How far the stamps of odometry and images are apart, from the turns of a base: what the images say of them has to be
+ * what odometry says, at another time. Only turns that begin, end or change tell; those of one speed look the same
+ * at all times. Times are those of the messages [s], angles are [rad].
+ */
+class ClockOffset
+{
+public:
+  /** Yaw of the base in odometry's frame. Stamps that are not later than the last one are left out. */
+  void addOdometry(double stamp, double yaw);
+
+  /** Yaw of the stored view as seen in an image; it falls as the base turns to the left. */
+  void addImage(double stamp, double view_yaw);
+
+  /**
+   * Odometry's stamp minus the image's for one and the same moment [s], within +-LARGEST; by the last seconds. Empty while
+   * the base has not turned enough to tell.
+   */
+  std::optional<double> estimate() const;
+
+  static constexpr double LARGEST = 0.6;  ///< [s]
+
+private:
+  struct Sample
+  {
+    double stamp;
+    double yaw;
+  };
+
+  double odometryAt(double stamp) const;
+
+  std::deque<Sample> odometry_;  // by stamp, unwrapped
+  std::deque<Sample> images_;
+};
+
+}  // namespace view_servo

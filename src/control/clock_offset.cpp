@@ -1,0 +1,157 @@
+// Copyright (c) 2026, the view_servo authors
+// SPDX-License-Identifier: BSD-3-Clause
+#include "view_servo/control/clock_offset.h"
+
+#include "view_servo/geometry/planar_pose.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+#include <iterator>
+#include <numeric>
+#include <vector>
+
+namespace view_servo
+{
+namespace
+{
+constexpr double KEPT = 15.0;  // [s]
+constexpr double STEP = 0.02;  // of the search [s]
+
+template <typename Samples>
+void dropOld(Samples& samples, double before)
+{
+  while (!samples.empty() && samples.front().stamp < before)
+  {
+    samples.pop_front();
+  }
+}
+
+double median(std::vector<double> values)
+{
+  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
+  std::nth_element(values.begin(), middle, values.end());
+  return *middle;
+}
+
+/** Mean turn of the view that no turn of the base explains, though odometry may turn too much or too little. */
+double unexplained(const std::vector<double>& views, const std::vector<double>& bases)
+{
+  constexpr double LARGEST_ERROR = 0.2;  // of odometry's turns, as of a base that skids
+  const auto count = static_cast<double>(views.size());
+  const double mean_view = std::accumulate(views.begin(), views.end(), 0.0) / count;
+  const double mean_base = std::accumulate(bases.begin(), bases.end(), 0.0) / count;
+  double product = 0.0;
+  double square = 0.0;
+  for (std::size_t i = 0; i < views.size(); ++i)
+  {
+    product += (views[i] - mean_view) * (bases[i] - mean_base);
+    square += (bases[i] - mean_base) * (bases[i] - mean_base);
+  }
+  const double scale = square > 0.0 ? std::clamp(-product / square, 1.0 - LARGEST_ERROR, 1.0 + LARGEST_ERROR) : 1.0;
+  std::vector<double> angles(views.size());
+  std::transform(views.begin(), views.end(), bases.begin(), angles.begin(),
+                 [&](double view, double base) { return view + scale * base; });
+  const double middle = median(angles);
+  return std::accumulate(angles.begin(), angles.end(), 0.0,
+                         [&](double sum, double angle) { return sum + std::abs(angle - middle); }) /
+         count;
+}
+
+}  // namespace
+
+void ClockOffset::addOdometry(double stamp, double yaw)
+{
+  if (!odometry_.empty())
+  {
+    if (stamp <= odometry_.back().stamp)
+    {
+      return;
+    }
+    yaw = odometry_.back().yaw + wrapAngle(yaw - odometry_.back().yaw);
+  }
+  odometry_.push_back({ stamp, yaw });
+  dropOld(odometry_, stamp - KEPT - 2.0 * LARGEST);
+}
+
+void ClockOffset::addImage(double stamp, double view_yaw)
+{
+  if (!images_.empty())
+  {
+    if (stamp <= images_.back().stamp)
+    {
+      return;
+    }
+    view_yaw = images_.back().yaw + wrapAngle(view_yaw - images_.back().yaw);
+  }
+  images_.push_back({ stamp, view_yaw });
+  dropOld(images_, stamp - KEPT);
+}
+
+double ClockOffset::odometryAt(double stamp) const
+{
+  const auto after = std::lower_bound(odometry_.begin() + 1, odometry_.end() - 1, stamp,
+                                      [](const Sample& sample, double time) { return sample.stamp < time; });
+  const Sample& a = *(after - 1);
+  const Sample& b = *after;
+  return a.yaw + (b.yaw - a.yaw) * (stamp - a.stamp) / (b.stamp - a.stamp);
+}
+
+std::optional<double> ClockOffset::estimate() const
+{
+  constexpr std::size_t FEWEST = 15;     // images
+  constexpr double CLEAR = 0.004;        // what a wrong offset has to leave unexplained [rad]
+  constexpr double CLEARLY_WORSE = 2.0;  // than the best one
+  constexpr int NEIGHBOUR = 5;           // steps to a wrong offset: 0.1 s
+  if (odometry_.size() < 2)
+  {
+    return std::nullopt;
+  }
+  std::vector<Sample> images;
+  std::copy_if(images_.begin(), images_.end(), std::back_inserter(images), [this](const Sample& image) {
+    return image.stamp - LARGEST >= odometry_.front().stamp && image.stamp + LARGEST <= odometry_.back().stamp;
+  });
+  if (images.size() < FEWEST)
+  {
+    return std::nullopt;
+  }
+  const int steps = static_cast<int>(std::lround(LARGEST / STEP));
+  std::vector<double> costs;
+  std::vector<double> views(images.size());
+  std::vector<double> bases(images.size());
+  std::transform(images.begin(), images.end(), views.begin(), [](const Sample& image) { return image.yaw; });
+  for (int i = -steps; i <= steps; ++i)
+  {
+    std::transform(images.begin(), images.end(), bases.begin(),
+                   [&](const Sample& image) { return odometryAt(image.stamp + i * STEP); });
+    costs.push_back(unexplained(views, bases));
+  }
+  const auto best = static_cast<int>(std::min_element(costs.begin(), costs.end()) - costs.begin());
+  if (best < NEIGHBOUR || best + NEIGHBOUR >= static_cast<int>(costs.size()))
+  {
+    return std::nullopt;
+  }
+  const auto cost = [&](int step) {
+    return costs[static_cast<std::size_t>(step)];
+  };
+  const double wrong = std::min(cost(best - NEIGHBOUR), cost(best + NEIGHBOUR));
+  if (wrong < CLEAR || wrong < CLEARLY_WORSE * cost(best))
+  {
+    return std::nullopt;
+  }
+  // The cost is like |x| beyond its noise: lines through both flanks meet at the offset.
+  const double left = cost(best - NEIGHBOUR) - cost(best - 1);
+  const double right = cost(best + NEIGHBOUR) - cost(best + 1);
+  double refined = 0.0;
+  if (left > 0.0 && right > 0.0)
+  {
+    const double left_slope = left / (NEIGHBOUR - 1);
+    const double right_slope = right / (NEIGHBOUR - 1);
+    // cost(best - 1) - left_slope (x + 1) = cost(best + 1) + right_slope (x - 1)
+    refined = (cost(best - 1) - cost(best + 1) - left_slope + right_slope) / (left_slope + right_slope);
+    refined = std::clamp(refined, -1.0, 1.0);
+  }
+  return (best - steps + refined) * STEP;
+}
+
+}  // namespace view_servo
