@@ -12,6 +12,7 @@
 #include <memory>
 #include <optional>
 #include <string>
+#include <utility>
 
 namespace view_servo::sim
 {
@@ -41,10 +42,10 @@ public:
     return std::make_unique<NomadRobot>(world, params);
   }
 
-  NomadInterface(const NomadRobot& robot, ros::NodeHandle& nh)
-    : odometry_publisher_(nh.advertise<nav_msgs::Odometry>("odom", 50))
+  NomadInterface(const NomadRobot& robot, FrameNames frames, ros::NodeHandle& nh)
+    : frames_(std::move(frames)), odometry_publisher_(nh.advertise<nav_msgs::Odometry>("odom", 50))
   {
-    static_broadcaster_.sendTransform(*robot.cameraMount(ros::Time::now()));
+    static_broadcaster_.sendTransform(frames_(*robot.cameraMount(ros::Time::now())));
   }
 
   static std::optional<Robot::Twist> toTwist(const Command& message)
@@ -59,8 +60,8 @@ public:
   void publish(NomadRobot& robot, const ros::Time& stamp)
   {
     const SensorMessages messages = robot.readSensors(stamp);
-    odometry_publisher_.publish(*messages.odometry);
-    broadcaster_.sendTransform(messages.transform);
+    odometry_publisher_.publish(frames_(*messages.odometry));
+    broadcaster_.sendTransform(frames_(messages.transform));
   }
 
   static void diagnose(const NomadRobot& robot, diagnostic_updater::DiagnosticStatusWrapper& status)
@@ -77,6 +78,7 @@ public:
   }
 
 private:
+  FrameNames frames_;
   ros::Publisher odometry_publisher_;
   tf2_ros::TransformBroadcaster broadcaster_;
   tf2_ros::StaticTransformBroadcaster static_broadcaster_;

@@ -60,17 +60,17 @@ public:
     return std::make_unique<PumaRobot>(world, robotDescription(nh), params);
   }
 
-  PumaInterface(const PumaRobot& /*robot*/, ros::NodeHandle& nh)
-    : joints_publisher_(nh.advertise<sensor_msgs::JointState>("joint_states", 50))
+  PumaInterface(const PumaRobot& /*robot*/, const FrameNames& frames, ros::NodeHandle& nh)
+    : camera_frame_(frames(CAMERA_FRAME)), joints_publisher_(nh.advertise<sensor_msgs::JointState>("joint_states", 50))
   {
   }
 
-  static std::optional<Robot::Twist> toTwist(const Command& message)
+  std::optional<Robot::Twist> toTwist(const Command& message) const
   {
-    if (message.header.frame_id != CAMERA_FRAME)
+    if (message.header.frame_id != camera_frame_)
     {
-      ROS_ERROR_STREAM_THROTTLE(1.0,
-                                "twists must be in " << CAMERA_FRAME << ", not in '" << message.header.frame_id << "'");
+      ROS_ERROR_STREAM_THROTTLE(
+          1.0, "twists must be in " << camera_frame_ << ", not in '" << message.header.frame_id << "'");
       return std::nullopt;
     }
     const auto& linear = message.twist.linear;
@@ -102,6 +102,7 @@ private:
     return puma.state() == Puma::State::AT_LIMIT || puma.state() == Puma::State::NEAR_SINGULARITY;
   }
 
+  std::string camera_frame_;
   ros::Publisher joints_publisher_;
 };
 

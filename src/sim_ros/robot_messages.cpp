@@ -21,6 +21,29 @@ std_msgs::Header header(const std::string& frame, const ros::Time& stamp)
 
 }  // namespace
 
+FrameNames::FrameNames(const std::string& prefix)
+{
+  const std::size_t begin = prefix.find_first_not_of('/');
+  if (begin != std::string::npos)
+  {
+    prefix_ = prefix.substr(begin, prefix.find_last_not_of('/') + 1 - begin) + "/";
+  }
+}
+
+geometry_msgs::TransformStamped FrameNames::operator()(geometry_msgs::TransformStamped transform) const
+{
+  transform.header.frame_id = (*this)(transform.header.frame_id);
+  transform.child_frame_id = (*this)(transform.child_frame_id);
+  return transform;
+}
+
+nav_msgs::Odometry FrameNames::operator()(nav_msgs::Odometry odometry) const
+{
+  odometry.header.frame_id = (*this)(odometry.header.frame_id);
+  odometry.child_frame_id = (*this)(odometry.child_frame_id);
+  return odometry;
+}
+
 geometry_msgs::Pose toPose(const Eigen::Isometry3d& pose)
 {
   geometry_msgs::Pose message;

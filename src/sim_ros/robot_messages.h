@@ -29,6 +29,24 @@ constexpr char ODOM_FRAME[] = "odom";
 constexpr char BASE_FRAME[] = "base_link";
 constexpr char CAMERA_FRAME[] = "camera_optical_frame";
 
+/** Names of a robot's frames: robots that share one /tf have different prefixes. */
+class FrameNames
+{
+public:
+  /** @param prefix put before names, with a slash between, as robot_state_publisher does; empty: names stay as they are. */
+  explicit FrameNames(const std::string& prefix);
+
+  std::string operator()(const std::string& frame) const
+  {
+    return prefix_ + frame;
+  }
+  geometry_msgs::TransformStamped operator()(geometry_msgs::TransformStamped transform) const;
+  nav_msgs::Odometry operator()(nav_msgs::Odometry odometry) const;
+
+private:
+  std::string prefix_;  // empty, or with a slash at its end
+};
+
 geometry_msgs::Pose toPose(const Eigen::Isometry3d& pose);
 /** @throws std::invalid_argument when the pose is not finite or its quaternion is not of length 1 (within 1 %). */
 Eigen::Isometry3d toIsometry(const geometry_msgs::Pose& pose);

@@ -46,6 +46,7 @@ struct SimulationParams
   double image_noise = -1.0;
   double focal_length_error = 0.0;
   double control_rate = 50.0;
+  std::string frame_prefix;
 
   /**
    * Reads the world, and gives its camera the noise asked for. @throws std::invalid_argument when it is for another
@@ -87,6 +88,9 @@ inline std::vector<Parameter> parameters(SimulationParams& params)
          "part by which the focal lengths in camera_info are too long"),
     real("control_rate", params.control_rate, "Hz", "[10, 1000]",
          "rate at which the robot moves and publishes its state"),
+    text("frame_prefix", params.frame_prefix,
+         "put before the names of the robot's frames, with a slash between, so that several robots share one /tf; "
+         "robot_state_publisher calls it tf_prefix"),
   };
 }
 
@@ -115,8 +119,8 @@ inline std::vector<Parameter> parameters(SimulationParams& params)
  *  - the types `Robot` (a sim::Robot), `Command` (the message on `cmd_vel`) and `Params`, the robot's parameters, with
  *    `seed`, their table parameters(Params&) and validate(); and the constant `KIND`;
  *  - `static std::unique_ptr<Robot> makeRobot(world, params, node_handle)`;
- *  - a constructor from the robot and a node handle, which advertises;
- *  - `static std::optional<Robot::Twist> toTwist(command)`, empty when the command must be refused;
+ *  - a constructor from the robot, its FrameNames and a node handle, which advertises;
+ *  - `std::optional<Robot::Twist> toTwist(command)`, empty when the command must be refused;
  *  - `publish(robot, stamp)`, which reads the robot's sensors, and `static diagnose(robot, status)`.
  */
 template <typename Interface>
@@ -142,7 +146,7 @@ public:
     world_ = params_.load(Interface::KIND);
     camera_ = std::make_unique<SimulatedCamera>(world_, params_.groupNames(), params_.seed);
     robot_ = Interface::makeRobot(world_, robot_params, nh_);
-    interface_ = std::make_unique<Interface>(*robot_, nh_);
+    interface_ = std::make_unique<Interface>(*robot_, FrameNames(params_.frame_prefix), nh_);
     robot_->setPose(world_.goal);
     if (!params_.start.empty())
     {
@@ -210,7 +214,7 @@ private:
   {
     const std::lock_guard<std::mutex> lock(robot_mutex_);
     advance();
-    const auto twist = Interface::toTwist(*message);
+    const auto twist = interface_->toTwist(*message);
     if (!twist || !robot_->command(*twist))
     {
       ROS_ERROR_STREAM_THROTTLE(
@@ -278,6 +282,7 @@ private:
       last_view_ = { now };
     }
     sensor_msgs::CameraInfo info = toCameraInfo(world_, params_.focal_length_error, stamp);
+    info.header.frame_id = FrameNames(params_.frame_prefix)(info.header.frame_id);
     if (image_publisher_.getNumSubscribers() > 0)
     {
       cv::Mat image;
