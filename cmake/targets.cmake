@@ -14,16 +14,18 @@ function(configure_target target)
   endif()
 endfunction()
 
-# precompile(TARGET HEADER...): what nearly all of a target's files include is compiled once.
-# precompile(TARGET REUSE_FROM OTHER): once for both.
-function(precompile target first)
+# precompile(TARGET GROUP HEADER...): what nearly all files of a group's targets include is compiled once, with the first of
+# them. They have to be compiled with the same options.
+function(precompile target group)
   if(CMAKE_VERSION VERSION_LESS 3.16)
     return()
   endif()
-  if(first STREQUAL "REUSE_FROM")
-    target_precompile_headers(${target} REUSE_FROM ${ARGN})
+  get_property(first GLOBAL PROPERTY VIEW_SERVO_PRECOMPILED_${group})
+  if(first)
+    target_precompile_headers(${target} REUSE_FROM ${first})
   else()
-    target_precompile_headers(${target} PRIVATE ${first} ${ARGN})
+    target_precompile_headers(${target} PRIVATE ${ARGN})
+    set_property(GLOBAL PROPERTY VIEW_SERVO_PRECOMPILED_${group} ${target})
   endif()
 endfunction()
 
@@ -34,15 +36,22 @@ function(link_visp target)
   target_link_libraries(${target} PRIVATE ${ARGN})
 endfunction()
 
-# vs_executable(NAME FILES file... LIBS library...): a program `NAME` by the target view_servo_NAME, as targets of all packages
-# of a workspace share their names. It is installed.
+# vs_executable(NAME [NODE] FILES file... LIBS library...): a program `NAME` by the target view_servo_NAME, as targets of all
+# packages of a workspace share their names. It is installed. A NODE includes much of ROS.
 function(vs_executable name)
-  cmake_parse_arguments(ARG "" "" "FILES;LIBS" ${ARGN})
+  cmake_parse_arguments(ARG "NODE" "" "FILES;LIBS" ${ARGN})
   set(target ${PROJECT_NAME}_${name})
   add_executable(${target} ${ARG_FILES})
   set_target_properties(${target} PROPERTIES OUTPUT_NAME ${name})
   configure_target(${target})
   target_include_directories(${target} PRIVATE ${PROJECT_SOURCE_DIR}/src)
   target_link_libraries(${target} PRIVATE ${ARG_LIBS})
+  if(ARG_NODE)
+    # Of headers that are precompiled GCC warns although they are not ours: it takes parts of boost for uninitialized.
+    target_compile_options(${target} PRIVATE -Wno-maybe-uninitialized)
+    precompile(${target} NODES <actionlib/server/action_server.h> <diagnostic_updater/diagnostic_updater.h>
+      <image_transport/image_transport.h> <message_filters/time_synchronizer.h> <ros/ros.h> <sensor_msgs/CameraInfo.h>
+      <sensor_msgs/Image.h> <tf2_ros/transform_listener.h> <opencv2/core.hpp> <Eigen/Geometry>)
+  endif()
   install(TARGETS ${target} RUNTIME DESTINATION ${CATKIN_PACKAGE_BIN_DESTINATION})
 endfunction()
