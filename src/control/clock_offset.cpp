@@ -34,10 +34,12 @@ double median(std::vector<double> values)
   return *middle;
 }
 
-/** Mean turn of the view that no turn of the base explains, though odometry may turn too much or too little. */
-double unexplained(const std::vector<double>& views, const std::vector<double>& bases)
+/**
+ * Mean turn of the view that no turn of the base explains. @param turn_error by which part odometry may turn too much or too
+ * little.
+ */
+double unexplained(const std::vector<double>& views, const std::vector<double>& bases, double turn_error)
 {
-  constexpr double LARGEST_ERROR = 0.2;  // of odometry's turns, as of a base that skids
   const auto count = static_cast<double>(views.size());
   const double mean_view = std::accumulate(views.begin(), views.end(), 0.0) / count;
   const double mean_base = std::accumulate(bases.begin(), bases.end(), 0.0) / count;
@@ -48,7 +50,7 @@ double unexplained(const std::vector<double>& views, const std::vector<double>& 
     product += (views[i] - mean_view) * (bases[i] - mean_base);
     square += (bases[i] - mean_base) * (bases[i] - mean_base);
   }
-  const double scale = square > 0.0 ? std::clamp(-product / square, 1.0 - LARGEST_ERROR, 1.0 + LARGEST_ERROR) : 1.0;
+  const double scale = square > 0.0 ? std::clamp(-product / square, 1.0 - turn_error, 1.0 + turn_error) : 1.0;
   std::vector<double> angles(views.size());
   std::transform(views.begin(), views.end(), bases.begin(), angles.begin(),
                  [&](double view, double base) { return view + scale * base; });
@@ -99,13 +101,24 @@ double ClockOffset::odometryAt(double stamp) const
 
 std::optional<double> ClockOffset::estimate() const
 {
+  constexpr double SKIDDING = 0.2;
+  constexpr double CLEARLY_BETTER = 0.6;
+  // Where a turn only dies away, as a control makes it, an error of odometry and one of time look nearly the same: odometry's
+  // turns are taken for right unless they explain the view's much worse.
+  const Fit right = fit(0.0);
+  const Fit wrong = fit(SKIDDING);
+  return wrong.unexplained < CLEARLY_BETTER * right.unexplained ? wrong.offset : right.offset;
+}
+
+ClockOffset::Fit ClockOffset::fit(double turn_error) const
+{
   constexpr std::size_t FEWEST = 15;     // images
-  constexpr double CLEAR = 0.004;        // what a wrong offset has to leave unexplained [rad]
-  constexpr double CLEARLY_WORSE = 2.0;  // than the best one
+  constexpr double CLEAR = 0.0006;       // what a wrong offset has to leave unexplained [rad]
+  constexpr double CLEARLY_WORSE = 4.0;  // than the best one
   constexpr int NEIGHBOUR = 5;           // steps to a wrong offset: 0.1 s
   if (odometry_.size() < 2)
   {
-    return std::nullopt;
+    return {};
   }
   std::vector<Sample> images;
   std::copy_if(images_.begin(), images_.end(), std::back_inserter(images), [this](const Sample& image) {
@@ -113,7 +126,7 @@ std::optional<double> ClockOffset::estimate() const
   });
   if (images.size() < FEWEST)
   {
-    return std::nullopt;
+    return {};
   }
   const int steps = static_cast<int>(std::lround(LARGEST / STEP));
   std::vector<double> costs;
@@ -124,20 +137,20 @@ std::optional<double> ClockOffset::estimate() const
   {
     std::transform(images.begin(), images.end(), bases.begin(),
                    [&](const Sample& image) { return odometryAt(image.stamp + i * STEP); });
-    costs.push_back(unexplained(views, bases));
+    costs.push_back(unexplained(views, bases, turn_error));
   }
   const auto best = static_cast<int>(std::min_element(costs.begin(), costs.end()) - costs.begin());
-  if (best < NEIGHBOUR || best + NEIGHBOUR >= static_cast<int>(costs.size()))
-  {
-    return std::nullopt;
-  }
   const auto cost = [&](int step) {
     return costs[static_cast<std::size_t>(step)];
   };
+  if (best < NEIGHBOUR || best + NEIGHBOUR >= static_cast<int>(costs.size()))
+  {
+    return { cost(best), std::nullopt };
+  }
   const double wrong = std::min(cost(best - NEIGHBOUR), cost(best + NEIGHBOUR));
   if (wrong < CLEAR || wrong < CLEARLY_WORSE * cost(best))
   {
-    return std::nullopt;
+    return { cost(best), std::nullopt };
   }
   // The cost is like |x| beyond its noise: lines through both flanks meet at the offset.
   const double left = cost(best - NEIGHBOUR) - cost(best - 1);
@@ -151,7 +164,7 @@ std::optional<double> ClockOffset::estimate() const
     refined = (cost(best - 1) - cost(best + 1) - left_slope + right_slope) / (left_slope + right_slope);
     refined = std::clamp(refined, -1.0, 1.0);
   }
-  return (best - steps + refined) * STEP;
+  return { cost(best), (best - steps + refined) * STEP };
 }
 
 }  // namespace view_servo

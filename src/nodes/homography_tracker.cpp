@@ -275,7 +275,8 @@ private:
     }
     else if (Clock::now() > last_frame_ + NO_IMAGE_AFTER)
     {
-      report(task, "no image comes on '" + camera_.imageTopic() + "'", false);
+      const std::string problem = camera_.problem();
+      report(task, problem.empty() ? "no image comes on '" + camera_.imageTopic() + "'" : problem, false);
     }
   }
 

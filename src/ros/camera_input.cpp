@@ -49,13 +49,11 @@ CameraInput::CameraInput(const ros::NodeHandle& nh, const CameraInputParams& par
   ros::NodeHandle topics_nh(nh);
   synchronizer_.connectInput(image_subscriber_, info_subscriber_);
   synchronizer_.registerCallback(&CameraInput::frameCallback, this);
-  image_subscriber_.registerCallback([this](const sensor_msgs::ImageConstPtr&) {
-    const std::lock_guard<std::mutex> lock(mutex_);
-    ++images_;
-  });
+  image_subscriber_.registerCallback([this](const sensor_msgs::ImageConstPtr&) { onImage(); });
   info_subscriber_.registerCallback([this](const sensor_msgs::CameraInfoConstPtr&) {
     const std::lock_guard<std::mutex> lock(mutex_);
     ++infos_;
+    unpaired_ = 0;
   });
   image_subscriber_.subscribe(transport_, "image_raw", queue_size, image_transport::TransportHints());
   info_subscriber_.subscribe(topics_nh, "camera_info", queue_size);
@@ -67,6 +65,29 @@ std::string CameraInput::fault() const
 {
   const std::lock_guard<std::mutex> lock(mutex_);
   return fault_;
+}
+
+std::string CameraInput::problem() const
+{
+  const std::lock_guard<std::mutex> lock(mutex_);
+  return problem_;
+}
+
+void CameraInput::onImage()
+{
+  constexpr int OFTEN = 5;  // a calibration may come after its image
+  std::string problem;
+  {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    ++images_;
+    if (++unpaired_ < OFTEN)
+    {
+      return;
+    }
+    problem_ = problem = "no camera_info comes on '" + info_subscriber_.getTopic() + "', though images come on '" +
+                         image_subscriber_.getTopic() + "'";
+  }
+  tell(problem);
 }
 
 CameraFrame CameraInput::latest() const
@@ -189,14 +210,36 @@ std::string CameraInput::faultOf(const sensor_msgs::Image& image, const sensor_m
 
 void CameraInput::checkInputs()
 {
-  const std::lock_guard<std::mutex> lock(mutex_);
-  if (pairs_ == 0 && images_ + infos_ > 0)
+  std::string problem;
   {
-    problem_ = "no image and camera_info with the same stamp: " + std::to_string(images_) + " and " +
-               std::to_string(infos_) + " messages in " + seconds(CHECK_PERIOD) + " on " + topics();
-    ROS_ERROR_STREAM(problem_);
+    const std::lock_guard<std::mutex> lock(mutex_);
+    if (pairs_ == 0 && images_ > 0 && infos_ > 0)
+    {
+      problem = "no image and camera_info with the same stamp: " + std::to_string(images_) + " and " +
+                std::to_string(infos_) + " messages in " + seconds(CHECK_PERIOD) + " on " + topics();
+    }
+    else if (images_ == 0 && infos_ > 0)
+    {
+      problem = "no image comes on '" + image_subscriber_.getTopic() + "', though camera_info comes on '" +
+                info_subscriber_.getTopic() + "'";
+    }
+    problem_ = problem.empty() ? problem_ : problem;
+    images_ = infos_ = pairs_ = 0;
   }
-  images_ = infos_ = pairs_ = 0;
+  tell(problem);
+}
+
+void CameraInput::tell(const std::string& problem) const
+{
+  if (problem.empty())
+  {
+    return;
+  }
+  ROS_ERROR_STREAM_THROTTLE(ERROR_PERIOD, problem);
+  if (on_problem_)
+  {
+    on_problem_(problem);
+  }
 }
 
 std::string CameraInput::topics() const

@@ -53,7 +53,7 @@ TEST(ClockOffset, IsFoundFromTurns)
   {
     Drive drive;
     drive.offset = offset;
-    for (const double noise : { 0.0, 0.002 })
+    for (const double noise : { 0.0, 0.001 })
     {
       drive.noise = noise;
       const std::optional<double> found = drive.estimate(turned);

@@ -154,6 +154,7 @@ public:
     camera_frame_ = camera_frame;
   }
 
+  std::atomic<bool> infos{ true };             // publishes camera_info with each image
   std::atomic<bool> shuffles{ false };         // every third odometry message comes 0.05 s late, every 20th 0.8 s
   std::atomic<bool> moves_odometry{ true };    // publishes it
   std::atomic<double> odometry_offset{ 0.0 };  // of its stamps against the images' [s]
@@ -183,7 +184,10 @@ private:
     {
       const cv::Mat image = black ? cv::Mat(scene().image.size(), CV_8UC1, cv::Scalar(0)) : scene().image;
       images_.publish(toImage(image, sensor_msgs::image_encodings::MONO8, info.header));
-      infos_.publish(info);
+      if (infos)
+      {
+        infos_.publish(info);
+      }
     }
     if (answers)
     {
@@ -268,6 +272,14 @@ TEST_F(HomingTest, StopsWhenTheCameraStopsAndGoesOnWithIt)
   drive();
   expectToStop([this] { robot_.camera = false; }, ServoStatus::LOST, "no image");
   robot_.camera = true;
+  expectToGoOn();
+}
+
+TEST_F(HomingTest, SaysThatItIsTheCalibrationThatStopped)
+{
+  drive();
+  expectToStop([this] { robot_.infos = false; }, ServoStatus::LOST, "no camera_info comes on '/driving/camera_info'");
+  robot_.infos = true;
   expectToGoOn();
 }
 

@@ -123,7 +123,7 @@ TEST(HomingTrial, FindsHowFarTheClocksOfOdometryAndCameraAreApart)
     params.conditions.odometry_delay = delay;
     HomingTrials trials(world, params);
     double found = NAN;
-    const HomingOutcome outcome = trials.run(fromGoal(world, { -0.9, 0.3, 12.0 * DEGREE }),
+    const HomingOutcome outcome = trials.run(fromGoal(world, { -0.5, 0.1, 20.0 * DEGREE }),
                                              [&](const HomingStep& step) { found = step.report.odometry_delay; });
     SCOPED_TRACE(delay);
     expectArrival(outcome, 0.02, 1.0 * DEGREE);

@@ -54,7 +54,8 @@ public:
 
   /**
    * Both functions are called by a spinner's thread, and have to be quick.
-   * @param on_frame called with every usable frame. @param on_problem called for every other frame, with what is wrong.
+   * @param on_frame called with every usable frame. @param on_problem called for every other frame, and for images
+   * without calibrations, with what is wrong.
    */
   CameraInput(const ros::NodeHandle& nh, const CameraInputParams& params, Callback on_frame = Callback(),
               std::function<void(const std::string&)> on_problem = {});
@@ -69,6 +70,8 @@ public:
   std::string missing(CameraFrame& frame, const CameraFrame& before = CameraFrame()) const;
   /** Why the newest image is not usable (see above), however old it is; empty when it is, or when none has come. */
   std::string fault() const;
+  /** Why no usable frame comes, in one line; empty while nothing is known. */
+  std::string problem() const;
 
   /**
    * Waits for latest(), as a camera may start later than its node. The wait is by a steady clock, and logged. Only one
@@ -88,6 +91,9 @@ public:
 
 private:
   void frameCallback(const sensor_msgs::ImageConstPtr& image, const sensor_msgs::CameraInfoConstPtr& info);
+  void onImage();
+  /** Logs a problem and hands it on; nothing when it is empty. The mutex is not held. */
+  void tell(const std::string& problem) const;
   void onPair(const sensor_msgs::ImageConstPtr& image, const sensor_msgs::CameraInfoConstPtr& info);
   std::string faultOf(const sensor_msgs::Image& image, const sensor_msgs::CameraInfo& info) const;
   void checkInputs();
@@ -101,6 +107,7 @@ private:
   CameraFrame latest_;
   std::string fault_;    // of the last pair
   std::string problem_;  // why the last frame was not usable, or none came
+  int unpaired_ = 0;     // images since the last camera_info
   int images_ = 0;       // since the last check
   int infos_ = 0;
   int pairs_ = 0;
