@@ -26,7 +26,7 @@ PlaneSession::PlaneSession(const CachedView& view, const sensor_msgs::CameraInfo
 {
   if (region_.empty())
   {
-    throw std::runtime_error("this camera shows nothing of the view's region without distortion, whereever it is");
+    throw std::runtime_error("nothing of the view's region is in this camera's picture once distortion is removed");
   }
   reset();
 }

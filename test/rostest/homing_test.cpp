@@ -345,6 +345,7 @@ TEST_F(HomingTest, KnowsFramesWithASlash)
 {
   robot_.setFrames(std::string("/") + sim::BASE_FRAME, std::string("/") + sim::CAMERA_FRAME);
   drive();
+  EXPECT_EQ(client_.getState().state_, GoalState::ACTIVE);
 }
 
 TEST_F(HomingTest, SaysThatImagesHaveNoFrame)

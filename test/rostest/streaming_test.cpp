@@ -453,19 +453,31 @@ TEST_F(StreamingTest, OutlivesWhatACameraShouldNotSend)
       << left_.matches.last()->reason;
 }
 
-TEST_F(StreamingTest, NamesBothTopicsWhenTheirStampsDiffer)
+TEST_F(StreamingTest, NamesBothTopicsWhenTheirStampsDifferOrOneIsSilent)
 {
   ros::NodeHandle nh;
   const Recorder<diagnostic_msgs::DiagnosticArray> diagnostics("/diagnostics");
-  ros::Publisher image_only = nh.advertise<sensor_msgs::Image>("right/camera/image_raw", 1);
-  const auto told = [&] {
-    return reported(diagnostics, "right/point_matcher",
-                    { "same stamp", "/right/camera/image_raw", "/right/camera/camera_info" });
+  ros::Publisher images = nh.advertise<sensor_msgs::Image>("right/camera/image_raw", 1);
+  ros::Publisher infos = nh.advertise<sensor_msgs::CameraInfo>("right/camera/camera_info", 1);
+  const auto told = [&](const std::string& words) {
+    return [&diagnostics, words] {
+      return reported(diagnostics, "right/point_matcher",
+                      { words, "/right/camera/image_raw", "/right/camera/camera_info" });
+    };
   };
-  EXPECT_TRUE(waitUntil(told, [&] {
+  const auto send_image = [&] {
     sensor_msgs::Image image = toMono8(picture_);
     image.header.stamp = ros::Time::now();
-    image_only.publish(image);
+    images.publish(image);
+  };
+  const auto send_info = [&] {
+    infos.publish(FakeCamera("none").infoOf(picture_, ros::Time::now() - ros::Duration(1.0)));
+  };
+  EXPECT_TRUE(waitUntil(told("no camera_info comes on"), send_image));
+  EXPECT_TRUE(waitUntil(told("no image comes on"), send_info));
+  EXPECT_TRUE(waitUntil(told("same stamp"), [&] {
+    send_image();
+    send_info();
   }));
 }
 
