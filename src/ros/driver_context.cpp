@@ -85,7 +85,7 @@ void DriverContext::waitFor(const std::function<std::string()>& missing)
     return locked([this] { return !preparing(); });
   };
   const auto lacking = [&] {
-    const std::string what = missing();
+    std::string what = missing();
     locked([&] { waiting_for_ = preparing() ? what : waiting_for_; });
     return what;
   };
