@@ -18,10 +18,20 @@ namespace
 constexpr double KEPT = 15.0;  // [s]
 constexpr double STEP = 0.02;  // of the search [s]
 
+/** Adds an angle, unwrapped, unless its stamp is not later than the last one; drops what is older than `kept` [s]. */
 template <typename Samples>
-void dropOld(Samples& samples, double before)
+void append(Samples& samples, double stamp, double yaw, double kept)
 {
-  while (!samples.empty() && samples.front().stamp < before)
+  if (!samples.empty())
+  {
+    if (stamp <= samples.back().stamp)
+    {
+      return;
+    }
+    yaw = samples.back().yaw + wrapAngle(yaw - samples.back().yaw);
+  }
+  samples.push_back({ stamp, yaw });
+  while (samples.front().stamp < stamp - kept)
   {
     samples.pop_front();
   }
@@ -64,30 +74,12 @@ double unexplained(const std::vector<double>& views, const std::vector<double>& 
 
 void ClockOffset::addOdometry(double stamp, double yaw)
 {
-  if (!odometry_.empty())
-  {
-    if (stamp <= odometry_.back().stamp)
-    {
-      return;
-    }
-    yaw = odometry_.back().yaw + wrapAngle(yaw - odometry_.back().yaw);
-  }
-  odometry_.push_back({ stamp, yaw });
-  dropOld(odometry_, stamp - KEPT - 2.0 * LARGEST);
+  append(odometry_, stamp, yaw, KEPT + 2.0 * LARGEST);
 }
 
 void ClockOffset::addImage(double stamp, double view_yaw)
 {
-  if (!images_.empty())
-  {
-    if (stamp <= images_.back().stamp)
-    {
-      return;
-    }
-    view_yaw = images_.back().yaw + wrapAngle(view_yaw - images_.back().yaw);
-  }
-  images_.push_back({ stamp, view_yaw });
-  dropOld(images_, stamp - KEPT);
+  append(images_, stamp, view_yaw, KEPT);
 }
 
 double ClockOffset::odometryAt(double stamp) const

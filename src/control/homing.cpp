@@ -240,7 +240,11 @@ protected:
         report_.confidence = static_cast<double>(result.supporting) / result.looked_for;
         report_.displacement = result.displacement;
         clocks_.addImage(stamp, result.pose.yaw);
-        report_.odometry_delay = clocks_.estimate().value_or(report_.odometry_delay);
+        if (stamp >= clocks_due_)
+        {
+          report_.odometry_delay = clocks_.estimate().value_or(report_.odometry_delay);
+          clocks_due_ = stamp + CLOCKS_PERIOD;
+        }
         follow(stamp, compose(camera, { scale_ * result.pose.x, scale_ * result.pose.y, result.pose.yaw }));
       }
     }
@@ -249,6 +253,7 @@ protected:
 
 private:
   static constexpr std::size_t ENOUGH_SUPPORT = 40;  // matches that structure is made from
+  static constexpr double CLOCKS_PERIOD = 0.5;       // between two estimates of their offset, which take a while [s]
   static constexpr int MIN_UPDATES = 2;              // sets of matches that agree before a hypothesis is followed
 
   /** The view's base pose as seen from the base. */
@@ -423,6 +428,7 @@ private:
     PlanarPose in_view;
   };
 
+  double clocks_due_ = 0.0;  // stamp of the image after which the offset of clocks is estimated anew
   HeadingHypotheses hypotheses_;
   ViewTracker tracker_;
   std::optional<PlanarPose> view_in_odom_;  // the view's level camera

@@ -22,7 +22,7 @@ constexpr std::size_t FISHEYE_COEFFICIENTS = 4;
 /** A pixel whose undistorted point comes back this far off lies where the distortion has no inverse [px]. */
 constexpr double MAX_INVERSION_ERROR = 0.1;
 
-/** As functions of OpenCV want them: it cannot be called with no points at all. */
+/** As OpenCV wants them; its functions refuse empty lists. */
 using CvPoints = std::vector<cv::Point2d>;
 
 bool isFisheye(const Camera& camera)
