@@ -16,8 +16,7 @@
 #include "experiments/line_ground_truth.h"
 #include "experiments/lines_table.h"
 #include "experiments/profile_experiments.h"
-
-#include <CLI/CLI.hpp>
+#include "tools/command_line.h"
 
 #include <algorithm>
 #include <cstdint>
@@ -148,21 +147,38 @@ bool plot(const fs::path& csv, const fs::path& png)
 
 int main(int argc, char** argv)
 {
-  CLI::App app("Runs the thesis' experiments and writes tables and plots.");
   std::string name;
   std::string out = ".";
   bool list = false;
+  std::optional<int> runs;
   ExperimentContext context;
-  app.add_option("name", name, "experiment; see --list");
-  app.add_option("--out", out, "folder for NAME.csv and NAME.png, made when it does not exist");
-  app.add_flag("--short", context.brief, "a small part of it, to see that it works");
-  app.add_option("--runs", context.runs, "how often to repeat what --list says is repeated")
-      ->check(CLI::PositiveNumber);
-  app.add_option("--seed", context.seed, "from which all random numbers are drawn")->check(CLI::NonNegativeNumber);
-  app.add_option("--threads", context.threads, "at most so many; 0: as many as there are processors")
-      ->check(CLI::NonNegativeNumber);
-  app.add_flag("--list", list, "names the experiments, with their runs and seeds");
-  CLI11_PARSE(app, argc, argv);
+  CommandLine line("Runs the thesis' experiments and writes tables and plots: experiments NAME [OPTIONS]",
+                   "Exit status: 0 the table and its plot were written, 1 the table alone, 2 bad input.");
+  line.text("out", out, "Folder for NAME.csv and NAME.png, made when it does not exist; default: here");
+  line.flag("short", context.brief, "A small part of it, to see that it works");
+  line.number("runs", runs, { 1.0, 1e6 }, "How often to repeat what --list says is repeated");
+  line.number("seed", context.seed, {}, "From which all random numbers are drawn");
+  line.number("threads", context.threads, { 0.0, 1024.0 }, "At most so many; 0: as many as there are processors");
+  line.flag("list", list, "Names the experiments, with their runs and seeds");
+  try
+  {
+    const std::optional<std::vector<std::string>> words = line.parse(argc, argv);
+    if (!words)
+    {
+      return 0;  // --help
+    }
+    if (words->size() > 1)
+    {
+      throw std::runtime_error("'" + (*words)[1] + "' is one word too many; see --help");
+    }
+    context.runs = runs.value_or(0);
+    name = words->empty() ? "" : words->front();
+  }
+  catch (const std::exception& error)
+  {
+    std::cerr << oneLine(error.what()) << std::endl;
+    return 2;
+  }
   if (list)
   {
     for (const Experiment& experiment : experiments())

@@ -4,11 +4,18 @@
 
 #include <fcntl.h>
 #include <unistd.h>
+#include <boost/program_options/options_description.hpp>
+#include <boost/program_options/variables_map.hpp>
 
+#include <cstdint>
 #include <cstdio>
 #include <iostream>
+#include <limits>
+#include <optional>
 #include <sstream>
+#include <stdexcept>
 #include <string>
+#include <vector>
 
 namespace view_servo
 {
@@ -48,6 +55,62 @@ public:
 
 private:
   int standard_error_;
+};
+
+/** Words of a command line that a program does not understand: what() names the option, and what it takes. */
+class CommandLineError : public std::runtime_error
+{
+  using std::runtime_error::runtime_error;
+};
+
+/** A range of numbers, its ends included. */
+struct NumberRange
+{
+  double low = 0.0;
+  double high = std::numeric_limits<double>::infinity();
+};
+
+/**
+ * What a program takes on its command line: options by their long names ("--rate 5" or "--rate=5"), each once but lists,
+ * and words without a name. All that is bound has to outlive parse().
+ */
+class CommandLine
+{
+public:
+  /** @param introduction what the program does and how it is called. @param ending for the end of --help. */
+  CommandLine(std::string introduction, std::string ending);
+
+  void flag(const std::string& name, bool& value, const std::string& description);
+  void text(const std::string& name, std::string& value, const std::string& description);
+  /** One of some words. */
+  void choice(const std::string& name, std::string& value, const std::vector<std::string>& words,
+              const std::string& description);
+  /** May be given more than once. @param separator of several in one word; 0: none. */
+  void list(const std::string& name, std::vector<std::string>& values, const std::string& description,
+            char separator = '\0');
+
+  /** @tparam Number double, int, std::uint64_t, or std::optional of one, which has no default. */
+  template <typename Number>
+  void number(const std::string& name, Number& value, const NumberRange& range, const std::string& description);
+
+  /** @return the words without a name, in their order; nothing when --help was asked for, and has been printed. */
+  std::optional<std::vector<std::string>> parse(int argc, const char* const* argv);
+
+  /** Whether the command line had an option. */
+  bool has(const std::string& name) const
+  {
+    return given_.count(name) > 0 && !given_[name].defaulted();
+  }
+
+private:
+  /** @param take gets the word after the option's name. */
+  template <typename Take>
+  void addWord(const std::string& name, const std::string& kind, const std::string& description, const Take& take);
+
+  std::string introduction_;
+  std::string ending_;
+  boost::program_options::options_description options_{ "Options" };
+  boost::program_options::variables_map given_;
 };
 
 }  // namespace view_servo

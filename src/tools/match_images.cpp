@@ -12,7 +12,6 @@
 #include "view_servo/views/prepared_image.h"
 #include "view_servo/views/segment_io.h"
 
-#include <CLI/CLI.hpp>
 #include <Eigen/Geometry>
 #include <nlohmann/json.hpp>
 #include <opencv2/core.hpp>
@@ -166,18 +165,18 @@ void writeOverlay(const std::string& path, const cv::Mat& picture)
   }
 }
 
-nlohmann::ordered_json toJson(const Eigen::Vector2d& point)
+nlohmann::json toJson(const Eigen::Vector2d& point)
 {
   return { point.x(), point.y() };
 }
 
-nlohmann::ordered_json toJson(const Segment& segment)
+nlohmann::json toJson(const Segment& segment)
 {
   return { segment.start.x(), segment.start.y(), segment.end.x(), segment.end.y() };
 }
 
 /** Row by row; null when it is not finite. */
-nlohmann::ordered_json toJson(const Eigen::Matrix3d& matrix)
+nlohmann::json toJson(const Eigen::Matrix3d& matrix)
 {
   if (!matrix.allFinite())
   {
@@ -187,9 +186,9 @@ nlohmann::ordered_json toJson(const Eigen::Matrix3d& matrix)
   return std::vector<double>(rows.data(), rows.data() + rows.size());
 }
 
-nlohmann::ordered_json toJson(const std::vector<MatchedPoint>& points)
+nlohmann::json toJson(const std::vector<MatchedPoint>& points)
 {
-  nlohmann::ordered_json json = nlohmann::ordered_json::array();
+  nlohmann::json json = nlohmann::json::array();
   for (const MatchedPoint& point : points)
   {
     json.push_back({ { "reference", toJson(point.position.reference) },
@@ -200,9 +199,9 @@ nlohmann::ordered_json toJson(const std::vector<MatchedPoint>& points)
   return json;
 }
 
-nlohmann::ordered_json toJson(const std::vector<MatchedLine>& lines)
+nlohmann::json toJson(const std::vector<MatchedLine>& lines)
 {
-  nlohmann::ordered_json json = nlohmann::ordered_json::array();
+  nlohmann::json json = nlohmann::json::array();
   for (const MatchedLine& line : lines)
   {
     json.push_back({ { "reference", toJson(line.reference) },
@@ -216,10 +215,9 @@ nlohmann::ordered_json toJson(const std::vector<MatchedLine>& lines)
 }
 
 /** What points and lines have in common. Numbers that are not finite become null. */
-nlohmann::ordered_json toJson(const ViewMatch& match, const std::string& model,
-                              const std::optional<double>& corner_error)
+nlohmann::json toJson(const ViewMatch& match, const std::string& model, const std::optional<double>& corner_error)
 {
-  nlohmann::ordered_json json;
+  nlohmann::json json;
   json["success"] = match.outcome == MatchOutcome::MATCHED;
   json["message"] = match.message;
   json["model"] = model;
@@ -280,7 +278,7 @@ public:
 
   /** Writes the picture and prints the result, in JSON with `more` at its end. */
   ExitStatus write(const ViewMatch& match, const PreparedImage& reference, const PreparedImage& current,
-                   const nlohmann::ordered_json& more) const
+                   const nlohmann::json& more) const
   {
     const bool found = match.outcome == MatchOutcome::MATCHED;
     if (!options_.overlay.empty())
@@ -294,7 +292,7 @@ public:
     }
     if (options_.json)
     {
-      nlohmann::ordered_json json = toJson(match, options_.model, corner_error);
+      nlohmann::json json = toJson(match, options_.model, corner_error);
       json.update(more);
       std::cout << json << '\n';
     }
@@ -360,7 +358,7 @@ ExitStatus matchLines(const Options& options)
                       { { "segments", segments_ms }, { "neighbours", prepared_ms - segments_ms } });
   match.elapsed_ms += prepared_ms;
 
-  nlohmann::ordered_json planes = nlohmann::ordered_json::array();
+  nlohmann::json planes = nlohmann::json::array();
   for (const Eigen::Matrix3d& plane : match.planes)
   {
     planes.push_back(toJson(plane));
@@ -385,27 +383,111 @@ void listParameters(const std::string& subcommand)
   }
 }
 
-/** What both subcommands take. `more_settings` are positional. */
-CLI::App* addSubcommand(CLI::App& app, const std::string& name, const std::string& description, Options& options,
-                        std::vector<std::string>& more_settings)
+constexpr char STATUSES[] = "Exit status: 0 a geometry was found, 1 none was found, 2 bad input.";
+
+template <typename Map>
+std::vector<std::string> namesOf(const Map& map)
 {
-  CLI::App* command = app.add_subcommand(name, description);
-  command->add_option("REF", options.reference, "Reference image: the stored view")->required();
-  command->add_option("CUR", options.current, "Current image: what the camera sees now")->required();
-  command->add_option("--model", options.model, "homography: the scene is a plane; fundamental: it has depth")
-      ->check(CLI::IsMember(MODELS))
-      ->capture_default_str();
-  command->add_option("--overlay", options.overlay, "Write a picture of the matches to this file");
-  command->add_flag("--json", options.json, "Print the result as one JSON object");
-  command->add_option("--threads", options.threads, "Threads to use; 0: one a core")
-      ->check(CLI::Range(0, 1024))
-      ->capture_default_str();
-  command->add_option("--set", options.settings, "name=value: another value for a parameter; see --list-parameters")
-      ->allow_extra_args(false);  // else it would take REF and CUR when it comes before them
-  command->add_option("SETTING", more_settings, "More name=value after --set");
-  command->add_option("--truth", options.truth,
-                      "File with the true homography; prints the mean error at the reference's corners");
-  return command;
+  std::vector<std::string> names;
+  for (const auto& [name, value] : map)
+  {
+    names.push_back(name);
+  }
+  return names;
+}
+
+/** Reads what follows the name of a subcommand; nothing when help was asked for. */
+std::optional<Options> readOptions(bool by_lines, int argc, const char* const* argv)
+{
+  Options options;
+  CommandLine line(by_lines ? "match_images lines REF CUR [OPTIONS]: matches two images by the structure of groups of "
+                              "line segments.\nREF is the stored view, CUR what the camera sees now."
+                            : "match_images points REF CUR [OPTIONS]: matches two images by the intensity profiles "
+                              "between corners.\nREF is the stored view, CUR what the camera sees now.",
+                   STATUSES);
+  line.choice("model", options.model, namesOf(MODELS), "homography: the scene is a plane; fundamental: it has depth");
+  line.text("overlay", options.overlay, "Write a picture of the matches to this file");
+  line.flag("json", options.json, "Print the result as one JSON object");
+  line.number("threads", options.threads, { 0.0, 1024.0 }, "Threads to use; 0: one a core");
+  line.list("set", options.settings,
+            "name=value: another value for a parameter; more may follow. See match_images --list-parameters");
+  line.text("truth", options.truth, "File with the true homography; prints the mean error at the reference's corners");
+  if (by_lines)
+  {
+    line.choice("groups", options.groups, namesOf(GROUPS), "Groups of segments that vote: three lines or two");
+    line.text("segments-ref", options.reference_segments,
+              "File with the reference's segments, a line x1 y1 x2 y2 each; else they are detected");
+    line.text("segments-cur", options.current_segments, "File with the current image's segments");
+  }
+  const std::optional<std::vector<std::string>> words = line.parse(argc, argv);
+  if (!words)
+  {
+    return std::nullopt;
+  }
+  if (words->size() < 2)
+  {
+    throw BadInput(words->empty() ? "REF and CUR, the two images, are missing" : "CUR, the current image, is missing");
+  }
+  options.reference = (*words)[0];
+  options.current = (*words)[1];
+  for (std::size_t i = 2; i < words->size(); ++i)
+  {
+    if (options.settings.empty())
+    {
+      throw BadInput("'" + (*words)[i] + "' is one word too many: REF and CUR are two images");
+    }
+    options.settings.push_back((*words)[i]);
+  }
+  return options;
+}
+
+/** Without a subcommand. */
+ExitStatus runWithoutImages(int argc, const char* const* argv)
+{
+  bool list_parameters = false;
+  CommandLine line(
+      "Matches two images of a scene, over wide changes of viewpoint:\n"
+      "  match_images points REF CUR [OPTIONS]   by the intensity profiles between corners\n"
+      "  match_images lines REF CUR [OPTIONS]    by the structure of groups of line segments\n"
+      "  match_images points --help              says which options there are",
+      STATUSES);
+  line.flag("list-parameters", list_parameters, "Print the names that --set knows, and end");
+  const std::optional<std::vector<std::string>> words = line.parse(argc, argv);
+  if (!words)
+  {
+    return FOUND;
+  }
+  if (!words->empty())
+  {
+    throw BadInput("'" + words->front() + "' is unknown: match_images points REF CUR, or lines, is known");
+  }
+  if (!list_parameters)
+  {
+    throw BadInput("say what to match, such as: match_images points REF CUR");
+  }
+  listParameters<PointViewMatcherParams>("points");
+  listParameters<LineMatcherParams>("lines");
+  return FOUND;
+}
+
+ExitStatus run(int argc, const char* const* argv)
+{
+  const std::string subcommand = argc > 1 ? argv[1] : "";
+  if (subcommand != "points" && subcommand != "lines")
+  {
+    return runWithoutImages(argc, argv);
+  }
+  const bool by_lines = subcommand == "lines";
+  const std::optional<Options> options = readOptions(by_lines, argc - 1, argv + 1);
+  if (!options)
+  {
+    return FOUND;  // --help
+  }
+  if (options->threads > 0)
+  {
+    cv::setNumThreads(options->threads);
+  }
+  return by_lines ? matchLines(*options) : matchPoints(*options);
 }
 
 }  // namespace
@@ -413,50 +495,9 @@ CLI::App* addSubcommand(CLI::App& app, const std::string& name, const std::strin
 int main(int argc, char** argv)
 {
   cv::utils::logging::setLogLevel(cv::utils::logging::LOG_LEVEL_SILENT);
-
-  Options options;
-  std::vector<std::string> more_settings;
-  bool list_parameters = false;
-  CLI::App app("Matches two images of a scene, over wide changes of viewpoint.", "match_images");
-  app.footer("Exit status: 0 a geometry was found, 1 none was found, 2 bad input.");
-  app.require_subcommand(0, 1);
-  app.add_flag("--list-parameters", list_parameters, "Print the names that --set knows, and end");
-  const CLI::App* points =
-      addSubcommand(app, "points", "By the intensity profiles between corners", options, more_settings);
-  CLI::App* lines = addSubcommand(app, "lines", "By the structure of groups of line segments", options, more_settings);
-  lines->add_option("--groups", options.groups, "Groups of segments that vote: three lines or two")
-      ->check(CLI::IsMember(GROUPS))
-      ->capture_default_str();
-  lines->add_option("--segments-ref", options.reference_segments,
-                    "File with the reference's segments, a line x1 y1 x2 y2 each; else they are detected");
-  lines->add_option("--segments-cur", options.current_segments, "File with the current image's segments");
   try
   {
-    app.parse(argc, argv);
-    if (list_parameters)
-    {
-      listParameters<PointViewMatcherParams>("points");
-      listParameters<LineMatcherParams>("lines");
-      return FOUND;
-    }
-    if (!points->parsed() && !lines->parsed())
-    {
-      throw BadInput("say what to match, such as: match_images points REF CUR");
-    }
-    options.settings.insert(options.settings.end(), more_settings.begin(), more_settings.end());
-    if (options.threads > 0)
-    {
-      cv::setNumThreads(options.threads);
-    }
-    return points->parsed() ? matchPoints(options) : matchLines(options);
-  }
-  catch (const CLI::ParseError& error)
-  {
-    if (error.get_exit_code() == static_cast<int>(CLI::ExitCodes::Success))
-    {
-      return app.exit(error);  // --help
-    }
-    std::cerr << "match_images: " << oneLine(error.what()) << '\n';
+    return run(argc, argv);
   }
   catch (const std::exception& error)
   {

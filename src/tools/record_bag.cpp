@@ -13,7 +13,6 @@
 
 #include <sensor_msgs/image_encodings.h>
 #include <tf2_msgs/TFMessage.h>
-#include <CLI/CLI.hpp>
 #include <Eigen/Geometry>
 #include <opencv2/core/utils/logger.hpp>
 
@@ -404,61 +403,42 @@ void recordImages(const std::string& file, const Options& options)
 
 // --------------------------------------------------------------------------------------------------- command line
 
-/** Finite numbers of a range, its ends included. */
-CLI::Validator between(double low, double high)
+void addOptions(CommandLine& line, Options& options)
 {
-  std::ostringstream range;
-  range << "[" << low << ", " << high << "]";
-  return CLI::Validator(
-      [low, high, text = range.str()](const std::string& word) {
-        double value = std::numeric_limits<double>::quiet_NaN();
-        return CLI::detail::lexical_cast(word, value) && value >= low && value <= high
-                   ? std::string()
-                   : "'" + word + "' is no number in " + text;
-      },
-      range.str());
+  const NumberRange rates{ 0.001, STEPS_PER_SECOND };
+  line.text("images", options.images, "Folder of recorded images with K.txt and poses.txt, instead of a world");
+  line.number("rate", options.rate, rates, "Images a second");
+  line.number("start-time", options.start_time, { 1.0, 4e9 }, "Of the bag [s]");
+  line.number("odometry-rate", options.odometry_rate, rates, "Readings of odometry or encoders a second");
+  line.number("seed", options.seed, {}, "Of all noise");
+  line.list("groups", options.groups, "Surfaces to show besides those that always are: groups, joined by commas", ',');
+  line.number("image-noise", options.image_noise, { 0.0, 255.0 },
+              "Standard deviation [grey levels]; default: the world's");
+  line.number("light-gain", options.light_gain, { 0.001, 100.0 }, "Factor of the grey levels; default: the world's");
+  line.number("light-offset", options.light_offset, { -255.0, 255.0 },
+              "Added to the grey levels; default: the world's");
+  line.number("focal-length-error", options.focal_length_error, { -0.5, 1.0 },
+              "By which part camera_info has it too long");
+  line.number("odometry-drift", options.odometry_drift, { -0.9, 10.0 },
+              "By which part the Nomad measures distances too long");
+  line.number("odometry-noise", options.odometry_noise, { 0.0, 10.0 },
+              "Standard deviation of its measured motion, as a part of it");
+  line.number("encoder-noise", options.encoder_noise, { 0.0, 1.0 },
+              "Standard deviation of the Puma's joint angles [rad]");
+  line.text("urdf", options.urdf, "File that describes the Puma; default: the package's");
 }
 
-void addOptions(CLI::App& app, Options& options)
+/** Options that mean nothing for recorded images. */
+void refuseOptionsOfWorlds(const CommandLine& line)
 {
-  app.add_option("NAMES", options.names,
-                 "A world's file, or the name of one of the package's; the name of one of its trajectories; and the "
-                 "file to write");
-  CLI::Option* images = app.add_option("--images", options.images,
-                                       "Folder of recorded images with K.txt and poses.txt, instead of a world");
-  app.add_option("--rate", options.rate, "Images a second")
-      ->check(between(0.001, STEPS_PER_SECOND))
-      ->capture_default_str();
-  app.add_option("--start-time", options.start_time, "Of the bag [s]")->check(between(1.0, 4e9))->capture_default_str();
-
-  const auto add = [&](const std::string& name, auto& value, const std::string& description) {
-    CLI::Option* option = app.add_option(name, value, description);
-    images->excludes(option);
-    return option;
-  };
-  add("--odometry-rate", options.odometry_rate, "Readings of odometry or encoders a second")
-      ->check(between(0.001, STEPS_PER_SECOND))
-      ->capture_default_str();
-  add("--seed", options.seed, "Of all noise")->check(CLI::NonNegativeNumber)->capture_default_str();
-  add("--groups", options.groups, "Surfaces to show besides those that always are: groups, joined by commas")
-      ->delimiter(',')
-      ->allow_extra_args(false);
-  add("--image-noise", options.image_noise, "Standard deviation [grey levels]; default: the world's")
-      ->check(between(0.0, 255.0));
-  add("--light-gain", options.light_gain, "Factor of the grey levels; default: the world's")
-      ->check(between(0.001, 100.0));
-  add("--light-offset", options.light_offset, "Added to the grey levels; default: the world's")
-      ->check(between(-255.0, 255.0));
-  add("--focal-length-error", options.focal_length_error, "By which part camera_info has it too long")
-      ->check(between(-0.5, 1.0))
-      ->capture_default_str();
-  add("--odometry-drift", options.odometry_drift, "By which part the Nomad measures distances too long")
-      ->check(between(-0.9, 10.0));
-  add("--odometry-noise", options.odometry_noise, "Standard deviation of its measured motion, as a part of it")
-      ->check(between(0.0, 10.0));
-  add("--encoder-noise", options.encoder_noise, "Standard deviation of the Puma's joint angles [rad]")
-      ->check(between(0.0, 1.0));
-  add("--urdf", options.urdf, "File that describes the Puma; default: the package's");
+  for (const char* name : { "odometry-rate", "seed", "groups", "image-noise", "light-gain", "light-offset",
+                            "focal-length-error", "odometry-drift", "odometry-noise", "encoder-noise", "urdf" })
+  {
+    if (line.has(name))
+    {
+      throw std::runtime_error(std::string("--") + name + " is for simulated robots, not for --images");
+    }
+  }
 }
 
 void record(const Options& options)
@@ -486,27 +466,28 @@ int main(int argc, char** argv)
 {
   cv::utils::logging::setLogLevel(cv::utils::logging::LOG_LEVEL_SILENT);
 
-  Options options;
-  CLI::App app(
-      "Records a bag of a simulated robot or of a folder of images, with the ground truth:\n"
-      "  record_bag WORLD TRAJECTORY OUT.bag [OPTIONS]\n"
-      "  record_bag --images FOLDER OUT.bag [OPTIONS]",
-      "record_bag");
-  app.footer("Exit status: 0 the bag was written, 2 bad input.");
-  addOptions(app, options);
   try
   {
-    app.parse(argc, argv);
+    Options options;
+    CommandLine line(
+        "Records a bag of a simulated robot or of a folder of images, with the ground truth:\n"
+        "  record_bag WORLD TRAJECTORY OUT.bag [OPTIONS]\n"
+        "  record_bag --images FOLDER OUT.bag [OPTIONS]\n"
+        "WORLD is a world's file, or the name of one of the package's; TRAJECTORY the name of one of its.",
+        "Exit status: 0 the bag was written, 2 bad input.");
+    addOptions(line, options);
+    const std::optional<std::vector<std::string>> words = line.parse(argc, argv);
+    if (!words)
+    {
+      return WRITTEN;  // --help
+    }
+    options.names = *words;
+    if (!options.images.empty())
+    {
+      refuseOptionsOfWorlds(line);
+    }
     record(options);
     return WRITTEN;
-  }
-  catch (const CLI::ParseError& error)
-  {
-    if (error.get_exit_code() == static_cast<int>(CLI::ExitCodes::Success))
-    {
-      return app.exit(error);  // --help
-    }
-    std::cerr << "record_bag: " << oneLine(error.what()) << '\n';
   }
   catch (const std::exception& error)
   {
