@@ -1,0 +1,259 @@
+// Copyright (c) 2026, the view_servo authors
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <Eigen/Core>
+
+#include <algorithm>
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <limits>
+#include <vector>
+
+namespace view_servo
+{
+/**
+ * Kd-tree over vectors of a few numbers, whose count the compiler knows so that distances use SIMD. It is split in the
+ * middle of the longest side of what is to be split; distances to cells grow by one coordinate with each step down (S. Arya,
+ * D. Mount: Algorithms for fast vector quantization, 1993).
+ */
+template <int Columns>
+class KdTree
+{
+public:
+  struct Neighbour
+  {
+    std::uint32_t index;     ///< of the vector
+    float squared_distance;  ///< to the query
+  };
+
+  /** An empty tree. */
+  KdTree() = default;
+
+  /** @param vectors `Columns` numbers each; they are copied. */
+  explicit KdTree(const std::vector<float>& vectors) : index_(vectors.size() / Columns)
+  {
+    for (std::size_t i = 0; i < index_.size(); ++i)
+    {
+      index_[i] = static_cast<std::uint32_t>(i);
+    }
+    if (index_.empty())
+    {
+      return;
+    }
+    bounds_ = boundsOf(vectors, 0, index_.size());
+    build(vectors, 0, index_.size());
+    vectors_.reserve(vectors.size());
+    for (const std::uint32_t i : index_)
+    {
+      const auto begin = vectors.begin() + static_cast<std::ptrdiff_t>(i) * Columns;
+      vectors_.insert(vectors_.end(), begin, begin + Columns);
+    }
+  }
+
+  /**
+   * The nearest, nearest first.
+   * @param tolerance one that is missed is at most (1 + tolerance) times nearer than the last of those found.
+   */
+  void findNearest(const float* query, std::size_t wanted, float tolerance, std::vector<Neighbour>& found) const
+  {
+    found.clear();
+    Nearest nearest{ wanted, found };
+    search(query, (1.0F + tolerance) * (1.0F + tolerance), nearest);
+  }
+
+  /** All nearer than a radius, nearest first. */
+  void findWithin(const float* query, float radius, std::vector<Neighbour>& found) const
+  {
+    found.clear();
+    Within within{ radius * radius, found };
+    search(query, 1.0F, within);
+    std::sort(found.begin(), found.end(),
+              [](const Neighbour& a, const Neighbour& b) { return a.squared_distance < b.squared_distance; });
+  }
+
+private:
+  using Vector = Eigen::Matrix<float, Columns, 1>;
+  using Map = Eigen::Map<const Vector>;
+  static constexpr std::size_t LEAF_SIZE = 32;
+
+  struct Bounds
+  {
+    std::array<float, Columns> low;
+    std::array<float, Columns> high;
+  };
+
+  /** Its left child is the next node. */
+  struct Node
+  {
+    int column = -1;          // that is split; -1: a leaf
+    float left_high = 0.0F;   // largest number of that column on the left, ...
+    float right_low = 0.0F;   // ... and smallest on the right
+    std::uint32_t right = 0;  // child
+    std::uint32_t begin = 0;  // of a leaf's vectors
+    std::uint32_t end = 0;
+  };
+
+  /** Collects the nearest, sorted. */
+  struct Nearest
+  {
+    std::size_t wanted;
+    std::vector<Neighbour>& found;
+
+    /** Only what is nearer can be of use [squared distance]. */
+    float reach() const
+    {
+      return found.size() < wanted ? std::numeric_limits<float>::infinity() : found.back().squared_distance;
+    }
+    void take(std::uint32_t index, float squared_distance)
+    {
+      if (found.size() < wanted)
+      {
+        found.emplace_back();
+      }
+      std::size_t place = found.size() - 1;
+      for (; place > 0 && found[place - 1].squared_distance > squared_distance; --place)
+      {
+        found[place] = found[place - 1];
+      }
+      found[place] = { index, squared_distance };
+    }
+  };
+
+  /** Collects all in reach. */
+  struct Within
+  {
+    float squared_radius;
+    std::vector<Neighbour>& found;
+
+    float reach() const
+    {
+      return squared_radius;
+    }
+    void take(std::uint32_t index, float squared_distance)
+    {
+      found.push_back({ index, squared_distance });
+    }
+  };
+
+  Bounds boundsOf(const std::vector<float>& vectors, std::size_t begin, std::size_t end) const
+  {
+    Vector low = Map(vectors.data() + static_cast<std::size_t>(index_[begin]) * Columns);
+    Vector high = low;
+    for (std::size_t i = begin + 1; i < end; ++i)
+    {
+      const Map vector(vectors.data() + static_cast<std::size_t>(index_[i]) * Columns);
+      low = low.cwiseMin(vector);
+      high = high.cwiseMax(vector);
+    }
+    Bounds bounds;
+    std::copy_n(low.data(), Columns, bounds.low.begin());
+    std::copy_n(high.data(), Columns, bounds.high.begin());
+    return bounds;
+  }
+
+  /** Orders index_[begin, end) and appends the nodes over it. */
+  void build(const std::vector<float>& vectors, std::size_t begin, std::size_t end)
+  {
+    const std::size_t node = nodes_.size();
+    nodes_.emplace_back();
+    if (end - begin <= LEAF_SIZE)
+    {
+      nodes_[node].begin = static_cast<std::uint32_t>(begin);
+      nodes_[node].end = static_cast<std::uint32_t>(end);
+      return;
+    }
+    const Bounds bounds = boundsOf(vectors, begin, end);
+    std::size_t column = 0;
+    for (std::size_t c = 1; c < Columns; ++c)
+    {
+      if (bounds.high[c] - bounds.low[c] > bounds.high[column] - bounds.low[column])
+      {
+        column = c;
+      }
+    }
+    const auto value = [&](std::uint32_t i) {
+      return vectors[static_cast<std::size_t>(i) * Columns + column];
+    };
+    const auto first = index_.begin() + static_cast<std::ptrdiff_t>(begin);
+    const auto last = index_.begin() + static_cast<std::ptrdiff_t>(end);
+    const float middle = 0.5F * (bounds.low[column] + bounds.high[column]);
+    auto split = std::partition(first, last, [&](std::uint32_t i) { return value(i) < middle; });
+    if (split == first || split == last)
+    {
+      // They are all alike.
+      split = first + (last - first) / 2;
+      std::nth_element(first, split, last, [&](std::uint32_t a, std::uint32_t b) { return value(a) < value(b); });
+    }
+    const auto less = [&](std::uint32_t a, std::uint32_t b) {
+      return value(a) < value(b);
+    };
+    nodes_[node].column = static_cast<int>(column);
+    nodes_[node].left_high = value(*std::max_element(first, split, less));
+    nodes_[node].right_low = value(*std::min_element(split, last, less));
+    const std::size_t border = static_cast<std::size_t>(split - index_.begin());
+    build(vectors, begin, border);
+    nodes_[node].right = static_cast<std::uint32_t>(nodes_.size());
+    build(vectors, border, end);
+  }
+
+  template <typename Collector>
+  void search(const float* query, float squared_factor, Collector& collector) const
+  {
+    if (nodes_.empty())
+    {
+      return;
+    }
+    std::array<float, Columns> offsets;  // squared, of the query from the cell, by column
+    float squared_distance = 0.0F;
+    for (std::size_t c = 0; c < Columns; ++c)
+    {
+      const float offset = std::max({ bounds_.low[c] - query[c], query[c] - bounds_.high[c], 0.0F });
+      offsets[c] = offset * offset;
+      squared_distance += offsets[c];
+    }
+    descend(0, query, squared_factor, squared_distance, offsets, collector);
+  }
+
+  template <typename Collector>
+  void descend(std::size_t number, const float* query, float squared_factor, float squared_distance,
+               std::array<float, Columns>& offsets, Collector& collector) const
+  {
+    const Node& node = nodes_[number];
+    if (node.column < 0)
+    {
+      const Map wanted(query);
+      for (std::size_t i = node.begin; i < node.end; ++i)
+      {
+        const float distance = (Map(vectors_.data() + i * Columns) - wanted).squaredNorm();
+        if (distance < collector.reach())
+        {
+          collector.take(index_[i], distance);
+        }
+      }
+      return;
+    }
+    const std::size_t column = static_cast<std::size_t>(node.column);
+    const float beyond_left = query[column] - node.left_high;
+    const float before_right = node.right_low - query[column];
+    const bool left_first = beyond_left < before_right;
+    const float offset = left_first ? before_right : beyond_left;
+    descend(left_first ? number + 1 : node.right, query, squared_factor, squared_distance, offsets, collector);
+    const float before = offsets[column];
+    const float other_distance = squared_distance - before + offset * offset;
+    if (other_distance * squared_factor <= collector.reach())
+    {
+      offsets[column] = offset * offset;
+      descend(left_first ? node.right : number + 1, query, squared_factor, other_distance, offsets, collector);
+      offsets[column] = before;
+    }
+  }
+
+  std::vector<std::uint32_t> index_;  // of the vectors, in the order of the leaves
+  std::vector<float> vectors_;        // in the same order
+  std::vector<Node> nodes_;
+  Bounds bounds_{};
+};
+
+}  // namespace view_servo
