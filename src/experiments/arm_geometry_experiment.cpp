@@ -409,9 +409,9 @@ void compareWithArm(const ArmData& data, const std::string& lens, std::ostream& 
           << Eigen::AngleAxisd(arm.linear()).angle() * DEGREES << ',' << solutions.size() << ',' << off_normal << ','
           << other_off_normal << ',' << chosen.rotation << ',' << chosen.translation << ',' << other.rotation << ','
           << other.translation << ',';
-      for (const double value : by_homography)
+      for (Eigen::Index i = 0; i < by_homography.size(); ++i)
       {
-        csv << value << ',';
+        csv << by_homography[i] << ',';
       }
       csv << difference.head<2>().norm() << ',' << std::abs(difference(2)) << ','
           << difference.tail<3>().norm() * DEGREES << '\n';

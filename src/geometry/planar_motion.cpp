@@ -83,8 +83,10 @@ std::vector<double> realRoots(const std::array<double, 5>& coefficients)
     }
   }
   std::vector<double> roots;
-  for (const std::complex<double>& root : companion.eigenvalues())
+  const Eigen::VectorXcd eigenvalues = companion.eigenvalues();
+  for (Eigen::Index i = 0; i < eigenvalues.size(); ++i)
   {
+    const std::complex<double>& root = eigenvalues[i];
     if (std::abs(root.imag()) < REAL * (1.0 + std::abs(root.real())))
     {
       roots.push_back(root.real());
