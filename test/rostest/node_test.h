@@ -4,6 +4,10 @@
 
 #include "support/corner_error.h"
 #include "support/textured_plane.h"
+#include "view_servo/Homography.h"
+#include "view_servo/LineMatches.h"
+#include "view_servo/PointMatches.h"
+#include "view_servo/ServoStatus.h"
 #include "view_servo/ros/conversions.h"
 
 #include <gtest/gtest.h>
@@ -86,15 +90,52 @@ inline void removeViews(const std::string& node)
   std::filesystem::remove_all(viewsDir(node));
 }
 
-/** The messages of a topic; safe to ask while spinner threads receive. */
+/** Whether a message says why it holds nothing, or what a driver does: people and drivers are told by its reason. */
+template <typename Message>
+bool givesReason(const Message& /*message*/)
+{
+  return true;
+}
+inline bool givesReason(const Homography& message)
+{
+  return message.valid != 0 || !message.reason.empty();
+}
+inline bool givesReason(const PointMatches& message)
+{
+  return message.homography.valid != 0 || !message.reason.empty();
+}
+inline bool givesReason(const LineMatches& message)
+{
+  return !message.matches.empty() || !message.reason.empty();
+}
+inline bool givesReason(const ServoStatus& message)
+{
+  return !message.reason.empty();
+}
+
+/** The messages of a topic; safe to ask while spinner threads receive. It is a failure when one lacks a reason. */
 template <typename Message>
 class Recorder
 {
 public:
-  Recorder(const std::string& topic)
+  explicit Recorder(const std::string& topic) : topic_(topic)
   {
     subscriber_ = ros::NodeHandle().subscribe<Message>(topic, 100, &Recorder::callback, this);
   }
+  ~Recorder()
+  {
+    subscriber_.shutdown();
+    for (const Message& message : messages_)
+    {
+      if (!givesReason(message))
+      {
+        ADD_FAILURE() << "a message on " << topic_ << " gives no reason:\n" << message;
+        break;
+      }
+    }
+  }
+  Recorder(const Recorder&) = delete;
+  Recorder& operator=(const Recorder&) = delete;
 
   std::deque<Message> messages() const
   {
@@ -117,6 +158,7 @@ private:
 
   mutable std::mutex mutex_;
   std::deque<Message> messages_;
+  std::string topic_;
   ros::Subscriber subscriber_;
 };
 

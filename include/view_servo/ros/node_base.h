@@ -24,7 +24,7 @@
 
 namespace view_servo
 {
-/** An exception's text without line breaks. */
+/** An exception's text for people: in one line, never empty, and without the assertions of OpenCV. */
 std::string oneLine(const std::exception& error);
 
 /** A time [s] as a text for people. */
@@ -84,7 +84,7 @@ std::string guarded(const std::string& what, const Body& body)
   try
   {
     body();
-    return fault;
+    return "";
   }
   catch (const std::exception& error)
   {
@@ -94,7 +94,6 @@ std::string guarded(const std::string& what, const Body& body)
   {
     fault = "unknown exception";
   }
-  fault = fault.empty() ? "exception without a text" : fault;
   ROS_ERROR_STREAM_THROTTLE(5.0, what << " failed: " << fault);
   return fault;
 }

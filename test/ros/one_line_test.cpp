@@ -1,0 +1,50 @@
+// Copyright (c) 2026, the view_servo authors
+// SPDX-License-Identifier: BSD-3-Clause
+#include "view_servo/ros/node_base.h"
+
+#include <gtest/gtest.h>
+#include <opencv2/core.hpp>
+
+#include <new>
+#include <stdexcept>
+#include <string>
+
+namespace view_servo
+{
+namespace
+{
+TEST(OneLine, JoinsLines)
+{
+  EXPECT_EQ(oneLine(std::runtime_error("no camera:\nlook there\n\n")), "no camera: look there");
+}
+
+TEST(OneLine, IsNeverEmpty)
+{
+  EXPECT_EQ(oneLine(std::runtime_error("")), "an exception without a text");
+  EXPECT_EQ(oneLine(std::runtime_error("\n")), "an exception without a text");
+  EXPECT_FALSE(oneLine(std::bad_alloc()).empty());
+  EXPECT_EQ(guarded("a message", [] { throw std::runtime_error(""); }), "an exception without a text");
+  EXPECT_EQ(guarded("a message", [] { throw 1; }), "unknown exception");
+  EXPECT_EQ(guarded("a message", [] {}), "");
+}
+
+TEST(OneLine, ShowsNoAssertionOfOpenCv)
+{
+  try
+  {
+    cv::Mat(3, 3, CV_8UC1).reshape(7);
+    FAIL() << "OpenCV does not complain";
+  }
+  catch (const cv::Exception& error)
+  {
+    const std::string text = oneLine(error);
+    EXPECT_NE(text.find("reshape"), std::string::npos) << text;
+    EXPECT_EQ(text.find("error:"), std::string::npos) << text;
+    EXPECT_EQ(text.find(".cpp"), std::string::npos) << text;
+  }
+  const cv::Exception memory(cv::Error::StsNoMem, "Failed to allocate 7 bytes", "OutOfMemoryError", "alloc.cpp", 73);
+  EXPECT_EQ(oneLine(memory), "memory is short");
+}
+
+}  // namespace
+}  // namespace view_servo
