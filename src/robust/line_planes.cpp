@@ -108,7 +108,7 @@ std::optional<Eigen::Matrix3d> fundamentalOfPoints(const Correspondences& points
   {
     return std::nullopt;
   }
-  return refineFundamental(*found.model, select(points, found.inliers), HUBER_WIDTH);
+  return polishFundamental(*found.model, select(points, found.inliers), HUBER_WIDTH);
 }
 
 std::optional<Eigen::Matrix3d> fundamentalOfPlanes(const SegmentPairs& lines, const LinePlanes& planes)

@@ -186,7 +186,7 @@ std::optional<PairFit> EpipolarPair::fitAssociation(const AssociationMatrix& ass
 
 Eigen::Matrix3d EpipolarPair::refine(const Eigen::Matrix3d& matrix, const Correspondences& pairs) const
 {
-  return refineFundamental(matrix, pairs, HUBER_WIDTH);
+  return polishFundamental(matrix, pairs, HUBER_WIDTH);
 }
 
 int EpipolarPair::sampleSize() const

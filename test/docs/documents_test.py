@@ -223,6 +223,9 @@ class Documented(unittest.TestCase):
                              for path in glob.glob(os.path.join(ROOT, "test", "rostest", "*.test")))
             for expression in words[3:]:
                 self.assertRegex(tests, expression)
+        elif words == ["scripts/test_releases"]:
+            # It installs whole releases: that it starts, and knows what it is asked for, has to do.
+            self.assertIn("unknown release 'nowhere'", self.run_here(script + " nowhere", 2))
         elif " ".join(words) not in NOT_RUN:
             self.assertEqual(words, ["scripts/check_rooms"])
             self.run_here(script)

@@ -3,6 +3,7 @@
 #include "view_servo/ros/node_base.h"
 
 #include <gtest/gtest.h>
+#include <ros/time.h>
 #include <opencv2/core.hpp>
 
 #include <new>
@@ -23,6 +24,7 @@ TEST(OneLine, IsNeverEmpty)
   EXPECT_EQ(oneLine(std::runtime_error("")), "an exception without a text");
   EXPECT_EQ(oneLine(std::runtime_error("\n")), "an exception without a text");
   EXPECT_FALSE(oneLine(std::bad_alloc()).empty());
+  ros::Time::init();
   EXPECT_EQ(guarded("a message", [] { throw std::runtime_error(""); }), "an exception without a text");
   EXPECT_EQ(guarded("a message", [] { throw 1; }), "unknown exception");
   EXPECT_EQ(guarded("a message", [] {}), "");

@@ -219,11 +219,11 @@ TEST(PointViewMatcher, FindsAViewThatIsMuchSmallerOrLarger)
 {
   const cv::Mat reference = blotchedPicture(4, 1.5, cv::Size(800, 600));
   Eigen::Matrix3d shrink = Eigen::Matrix3d::Identity();
-  shrink.topLeftCorner<2, 2>() = Eigen::Rotation2Dd(0.3).toRotationMatrix() / 2.8;
+  shrink.topLeftCorner<2, 2>() = Eigen::Rotation2Dd(0.3).toRotationMatrix() / 3.2;
   shrink(0, 2) = 300.0;
   shrink(1, 2) = 200.0;
   cv::Mat blurred;
-  cv::GaussianBlur(reference, blurred, cv::Size(), 1.2);  // what the smaller image cannot show
+  cv::GaussianBlur(reference, blurred, cv::Size(), 1.4);  // what the smaller image cannot show
   const cv::Mat current = warpedPicture(blurred, shrink, reference.size());
 
   PointViewMatcherParams params;
