@@ -496,13 +496,14 @@ private:
 
 World readWorld(const std::string& file)
 {
+  const std::filesystem::path path(file);
+  std::error_code unknown;
+  if (!std::filesystem::is_regular_file(path, unknown))
+  {
+    throw std::invalid_argument(file + ": cannot be read");
+  }
   try
   {
-    const std::filesystem::path path(file);
-    if (!std::filesystem::is_regular_file(path))
-    {
-      throw YAML::BadFile(file);
-    }
     World world = WorldReader(YAML::LoadFile(file), path.parent_path()).read();
     world.name = path.stem().string();
     return world;
