@@ -24,9 +24,9 @@ double gradientSimilarity(const cv::Mat& reference, const cv::Mat& current);
 /** Options of the arrival detector. */
 struct ArrivalDetectorParams
 {
-  double rise = 1.0;       ///< standard deviations of the similarities before, which a sudden rise exceeds
-  double min_rise = 0.08;  ///< a sudden rise exceeds this as well
-  double drop = 0.1;       ///< the view was passed when this part of the gain over the mean before is lost again
+  double rise = 1.0;       ///< least sudden rise of the similarity, in standard deviations of those before it
+  double min_rise = 0.08;  ///< least sudden rise, whatever their deviation [1]
+  double drop = 0.1;       ///< the view has been passed when the similarity has lost this part of its rise again
   int min_history = 5;     ///< similarities that must be known before a rise counts
 
   /** All faults, one a line; empty when the parameters are usable. */

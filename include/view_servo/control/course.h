@@ -24,14 +24,14 @@ struct Course
   Kind kind = STAND;
 
   // TO_VIEW.
-  PlanarPose view;                                             ///< base pose at the view
+  PlanarPose view;                                             ///< base pose at the view, in odometry's frame
   double gain = 1.0;                                           ///< speed per distance [1/s]
   double turn_gain = 1.0;                                      ///< turn rate per yaw error [1/s]
   double min_speed = 0.0;                                      ///< however near the view is [m/s]
   double max_speed = std::numeric_limits<double>::infinity();  ///< however far the view is [m/s]
 
   // STEP.
-  PlanarPose start;      ///< base pose at its beginning
+  PlanarPose start;      ///< base pose at its beginning, in odometry's frame
   double heading = 0.0;  ///< in the base's frame there [rad]
   double length = 0.0;   ///< [m]
   double speed = 0.0;    ///< [m/s]

@@ -18,10 +18,10 @@ namespace view_servo
 /** Parameters that all drivers have. */
 struct DriverParams
 {
-  bool dry_run = false;
-  double timeout = 60.0;                   // [s]
-  double control_rate = 50.0;              // [Hz]
-  double start_patience = START_PATIENCE;  // [s]
+  bool dry_run = false;                    ///< publishes commands on cmd_vel_dry, not on cmd_vel
+  double timeout = 60.0;                   ///< a goal that asks for none ends after this time [s]
+  double control_rate = 50.0;              ///< of commands [Hz]
+  double start_patience = START_PATIENCE;  ///< how long a goal waits for what it needs before it drives [s]
 };
 
 /** Names, units, ranges and meanings of these parameters, here and below. */
@@ -33,12 +33,13 @@ struct HomingDriverParams
   DriverParams node;
   CameraInputParams camera;
   std::filesystem::path views_dir;
-  std::string view;
-  std::string base_frame = "base_link";
-  double image_timeout = 0.25;
-  double odometry_timeout = 0.25;
-  double odometry_delay = 0.0;
-  double match_timeout = 0.25;
+  std::string
+      view;  ///< whose direction is estimated while there is no goal, and which a goal without a name means; empty: none
+  std::string base_frame = "base_link";  ///< in which cmd_vel is
+  double image_timeout = 0.25;           ///< the base stands when no image has come for so long [s]
+  double odometry_timeout = 0.25;        ///< the base stands when no odometry has come for so long [s]
+  double odometry_delay = 0.0;           ///< odometry's stamps are later than images' of the same moment by this [s]
+  double match_timeout = 0.25;           ///< the base stands when it needs matches and none have come for so long [s]
   HomingParams homing;
   VelocityLimits limits;
 
@@ -63,11 +64,11 @@ struct ServoDriverParams
 {
   DriverParams node;
   std::filesystem::path views_dir;
-  double acquire_timeout = 15.0;
-  double homography_timeout = 0.25;
-  double max_homography_age = 0.5;
-  double joint_margin = 0.02;
-  double joint_timeout = 1.0;
+  double acquire_timeout = 15.0;     ///< a goal ends when the view has not been found after this time [s]
+  double homography_timeout = 0.25;  ///< the arm stands when no homography has come for so long [s]
+  double max_homography_age = 0.5;   ///< homographies of older images are not used [s]
+  double joint_margin = 0.02;        ///< a goal ends when a joint comes this near to its limit [rad or m]
+  double joint_timeout = 1.0;        ///< the arm stands when joint states have ceased for so long [s]
   Servo25dParams servo;
   VelocityLimits limits = ARM_LIMITS;
 

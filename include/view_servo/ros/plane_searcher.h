@@ -24,10 +24,10 @@ class PlaneSearcher
 public:
   struct Search
   {
-    std::uint64_t era;  ///< chosen by the caller, who can tell outdated answers by it
-    PlaneFinder::Question question;
-    std::optional<Eigen::Isometry3d> camera_in_odom;  ///< when the image was taken
-    PlaneFinder::Answer answer;
+    std::uint64_t era;                                ///< chosen by the caller, who can tell outdated answers by it
+    PlaneFinder::Question question;                   ///< the view, and the image in which it is looked for
+    std::optional<Eigen::Isometry3d> camera_in_odom;  ///< pose of the camera when the image was taken, odom from camera
+    PlaneFinder::Answer answer;                       ///< set when the search has ended
   };
 
   /** @param period least time from the begin of one search to the next [s]. @param finder must outlive this. */
