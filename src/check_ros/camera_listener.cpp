@@ -184,6 +184,12 @@ double CameraListener::silence() const
   return steadySeconds() - last_time_;
 }
 
+int CameraListener::count() const
+{
+  const std::lock_guard<std::mutex> lock(mutex_);
+  return images_.count();
+}
+
 std::string CameraListener::apart(const DriverInput& odometry) const
 {
   const std::lock_guard<std::mutex> lock(mutex_);

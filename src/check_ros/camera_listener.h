@@ -44,6 +44,8 @@ public:
   std::vector<ros::Time> stamps() const;
   /** Time since the last image came [s]; infinite before the first. */
   double silence() const;
+  /** Number of images that have come. */
+  int count() const;
   /** See stampsApart(). */
   std::string apart(const DriverInput& odometry) const;
 

@@ -62,12 +62,7 @@ void OdometryListener::onOdometry(const nav_msgs::Odometry& message)
   frame_ = message.header.frame_id;
   child_frame_ = message.child_frame_id;
   meter_.add(steadySeconds(), ageOf(stamp), place == DriverInput::Stamp::LATE);
-  const std::string apart = camera_.apart(stamps_);
-  if (!apart.empty())
-  {
-    apart_fault_ = apart;
-    ++apart_;
-  }
+  compareClocks();
   const std::optional<OdometryReading> reading = reader_.read(message, subscriber_.getNumPublishers());
   fault_ = reading || !stamp_fault_.empty() ? "" : input_.problem();
   if (reading)
@@ -76,6 +71,24 @@ void OdometryListener::onOdometry(const nav_msgs::Odometry& message)
     history_.add(reading->time, reading->pose);
     clocks_.addOdometry(reading->time, reading->pose.yaw);
     last_time_ = steadySeconds();
+  }
+}
+
+void OdometryListener::compareClocks()
+{
+  // Once an image, as homing does: between images the newest one grows old however right its stamp is.
+  const int images = camera_.count();
+  if (images == compared_images_)
+  {
+    return;
+  }
+  compared_images_ = images;
+  ++comparisons_;
+  const std::string apart = camera_.apart(stamps_);
+  if (!apart.empty())
+  {
+    apart_fault_ = apart;
+    ++apart_;
   }
 }
 
@@ -91,7 +104,7 @@ OdometryObservations OdometryListener::observations(const RosGraph& graph) const
   odometry.frame = frame_;
   odometry.child_frame = child_frame_;
   odometry.fault = fault_;
-  odometry.apart_fault = 2 * apart_ > meter_.count() ? apart_fault_ : "";
+  odometry.apart_fault = 2 * apart_ > comparisons_ ? apart_fault_ : "";
   return odometry;
 }
 

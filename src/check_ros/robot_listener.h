@@ -48,6 +48,8 @@ public:
 
 private:
   void onOdometry(const nav_msgs::Odometry& message);
+  /** Compares the newest stamps of odometry and images. The mutex is held. */
+  void compareClocks();
 
   const CameraListener& camera_;
   const std::string topic_;
@@ -65,7 +67,9 @@ private:
   std::string fault_;        // of the last message
   std::string stamp_fault_;  // likewise
   std::string apart_fault_;
-  int apart_ = 0;  // messages that stampsApart() objected to
+  int compared_images_ = 0;  // that had come at the last comparison with them
+  int comparisons_ = 0;
+  int apart_ = 0;  // comparisons that stampsApart() objected to
   double last_time_;
   ros::Subscriber subscriber_;
 };

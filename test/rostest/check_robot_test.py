@@ -21,12 +21,12 @@ ROOT = os.path.realpath(os.path.join(os.path.dirname(os.path.abspath(__file__)),
 sys.path.insert(0, os.path.join(ROOT, "test", "docs"))
 import graph  # noqa: E402
 
+import genpy.dynamic  # noqa: E402
 import geometry_msgs.msg  # noqa: E402
 import nav_msgs.msg  # noqa: E402
 import numpy  # noqa: E402
 import rospy  # noqa: E402
 import sensor_msgs.msg  # noqa: E402
-import tf2_msgs.msg  # noqa: E402
 
 SECONDS = "3"      # that check_robot listens
 PATIENCE = 120.0   # for one run [s]
@@ -37,6 +37,12 @@ OF_THE_MACHINE = {"processor", "views' disk"}
 OF_THE_LOAD = OF_THE_MACHINE | {"images", "image stamps", "odometry", "odometry stamps", "clocks", "camera_info", "joint states"}
 
 Case = collections.namedtuple("Case", "name arguments line level words")
+
+
+# The Python side of tf2_msgs is not needed for anything else, and need not be installed.
+TFMessage = genpy.dynamic.generate_dynamic(
+    "tf2_msgs/TFMessage", "geometry_msgs/TransformStamped[] transforms\n%s\nMSG: geometry_msgs/TransformStamped\n%s" %
+    ("=" * 80, geometry_msgs.msg.TransformStamped._full_text))["tf2_msgs/TFMessage"]
 
 
 # ---------------------------------------------------------------------------------------- what is broken in a set-up
@@ -144,7 +150,7 @@ CASES = [
     Case("other_child", ["odom:=/other_child/odom"], "odometry frames", "error", "is of 'wheel_centre'"),
     Case("no_images", ["camera:=/nowhere"], "images", "error", "nobody publishes it"),
     Case("no_odometry", ["odom:=/nowhere"], "odometry", "error", "no odometry has come on '/nowhere'"),
-    Case("no_listener", ["cmd_vel:=/nowhere"], "commands", "error", "nobody listens on '/nowhere'"),
+    Case("no_listener", ["cmd_vel:=/nobody"], "commands", "error", "nobody listens on '/nobody'"),
     Case("two_sources", ["odom:=/plain/odom"], "odometry frames", "error", "2 nodes publish odometry"),
 ]
 
@@ -163,8 +169,8 @@ class Relay:
                 if change not in (None, drop):
                     self.publishers.append((kind, change, rospy.Publisher("/%s/%s" % (name, self.TOPICS[kind]), self.TYPES[kind],
                                                                           queue_size=5)))
-        self.tf = rospy.Publisher("/tf", tf2_msgs.msg.TFMessage, queue_size=5, latch=True)
-        self.static_tf = rospy.Publisher("/tf_static", tf2_msgs.msg.TFMessage, queue_size=5, latch=True)
+        self.tf = rospy.Publisher("/tf", TFMessage, queue_size=5, latch=True)
+        self.static_tf = rospy.Publisher("/tf_static", TFMessage, queue_size=5, latch=True)
         self.subscribers = [None] * len(self.TYPES)
         self.wanted = [False] * len(self.TYPES)
         self.ends = threading.Event()
@@ -190,7 +196,7 @@ class Relay:
     def publish_frames(self):
         """tf of frames that are there, but wrong. The camera's own is 1 m above the base's and looks ahead."""
         optical = (-0.5, 0.5, -0.5, 0.5)
-        upside_down = (-0.5, -0.5, 0.5, 0.5)
+        upside_down = (0.5, 0.5, 0.5, 0.5)
         self.static_tf.publish([self.transform("camera_link", (0.0, 0.0, 0.0, 1.0), rospy.Time()),
                                 self.transform("hanging_optical_frame", upside_down, rospy.Time())])
         self.tf.publish([self.transform("old_optical_frame", optical, rospy.Time.now() - rospy.Duration(5))])
@@ -284,6 +290,14 @@ class CheckRobot(unittest.TestCase):
             if name not in tolerated:
                 self.assertEqual(line["level"], "ok", line)
 
+    def assert_broken(self, lines, case):
+        self.assertIn(case.line, lines)
+        self.assertEqual(lines[case.line]["level"], case.level, lines[case.line])
+        self.assertIn(case.words, lines[case.line]["message"])
+        tolerated = set() if lines["processor"]["level"] == "ok" else OF_THE_LOAD
+        errors = {name for name, line in lines.items() if line["level"] == "error" and name not in tolerated - {case.line}}
+        self.assertEqual(errors, {case.line} if case.level == "error" else set(), lines)
+
     # ---------------------------------------------------------------------------------------------------------- tests
 
     def test_1_all_is_well_with_a_base(self):
@@ -305,12 +319,12 @@ class CheckRobot(unittest.TestCase):
         process = self.begin("people", "cmd_vel:=/nowhere", "sim:=false", "view:=dock", "max_speed:=0.1")
         text, _ = process.communicate(timeout=PATIENCE)
         self.assertEqual(process.returncode, 2, text)
-        self.assertRegex(text, r"(?m)^ok       images            \d+\.\d Hz on '/camera/image_raw'")
+        self.assertRegex(text, r"(?m)^(ok       |WARNING  )images            \d+\.\d Hz on '/camera/image_raw'")
         self.assertRegex(text, r"(?m)^ERROR    commands          nobody listens on '/nowhere'\n {27}-> start the robot's driver")
         self.assertRegex(text, r"\d+ ok, \d+ warnings?, 1 error; the camera's picture is in people.png\n$")
 
     def test_3_broken_bases(self):
-        AT_ONCE = 4
+        AT_ONCE = 3
         second_source = self.graph.start(sys.executable, os.path.abspath(__file__), PUBLISH_ODOMETRY)
         graph.wait_until("two sources of odometry", lambda: len(self.graph.state()[0].get("/plain/odom", [])) == 2)
         for first in range(0, len(CASES), AT_ONCE):
@@ -318,26 +332,19 @@ class CheckRobot(unittest.TestCase):
             for case, process in runs:
                 with self.subTest(case.name):
                     lines = self.outcome(process)
-                    self.assertIn(case.line, lines)
-                    self.assertEqual(lines[case.line]["level"], case.level, lines[case.line])
-                    self.assertIn(case.words, lines[case.line]["message"])
-                    self.assertEqual({name for name, line in lines.items() if line["level"] == "error"},
-                                     {case.line} if case.level == "error" else set(), lines)
+                    self.assert_broken(lines, case)
         second_source.send_signal(signal.SIGINT)
 
     def test_3_broken_arms(self):
         cases = [
             Case("other_arm", ["joint_states:=/other_arm/joint_states"], "joint states", "error", "has no joints other_"),
             Case("other_base", ["odom_frame:=nowhere"], "tf", "error", "tf does not know"),
-            Case("arm_without_listener", ["cmd_vel:=/nowhere"], "commands", "error", "nobody listens on '/nowhere'"),
+            Case("arm_without_listener", ["cmd_vel:=/nobody"], "commands", "error", "nobody listens on '/nobody'"),
         ]
         runs = [(case, self.begin(case.name, "--json", *case.arguments, arm=True)) for case in cases]
         for case, process in runs:
             with self.subTest(case.name):
-                lines = self.outcome(process)
-                self.assertEqual(lines[case.line]["level"], case.level, lines[case.line])
-                self.assertIn(case.words, lines[case.line]["message"])
-                self.assertEqual([name for name, line in lines.items() if line["level"] == "error"], [case.line])
+                self.assert_broken(self.outcome(process), case)
 
     def test_4_moves(self):
         short = ["--json", "--move", "--yes", "--distance", "0.05", "--angle", "8"]
@@ -418,4 +425,4 @@ def publish_odometry():
 if __name__ == "__main__" and PUBLISH_ODOMETRY in sys.argv:
     publish_odometry()
 elif __name__ == "__main__":
-    unittest.main(verbosity=2)
+    unittest.main(verbosity=2, warnings="ignore")  # ROS leaves sockets to the end
