@@ -121,4 +121,21 @@ std::map<std::string, JointLimits> jointLimits(const std::string& urdf_xml)
   return limits;
 }
 
+std::set<std::string> movableJoints(const std::string& urdf_xml)
+{
+  std::set<std::string> names;
+  const urdf::ModelInterfaceSharedPtr model = urdf_xml.empty() ? nullptr : urdf::parseURDF(urdf_xml);
+  if (model)
+  {
+    for (const auto& [name, joint] : model->joints_)
+    {
+      if (joint->type != urdf::Joint::FIXED && !joint->mimic)
+      {
+        names.insert(name);
+      }
+    }
+  }
+  return names;
+}
+
 }  // namespace view_servo

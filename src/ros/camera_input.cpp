@@ -3,14 +3,12 @@
 #include "view_servo/ros/camera_input.h"
 
 #include "view_servo/images/image_io.h"
-#include "view_servo/ros/conversions.h"
 #include "view_servo/ros/node_base.h"
 #include "view_servo/ros/readiness.h"
 
 #include <ros/console.h>
 #include <ros/time.h>
 
-#include <cmath>
 #include <cstdint>
 #include <exception>
 #include <utility>
@@ -84,8 +82,9 @@ void CameraInput::onImage()
     {
       return;
     }
-    problem_ = problem = "no camera_info comes on '" + info_subscriber_.getTopic() + "', though images come on '" +
-                         image_subscriber_.getTopic() + "'";
+    CameraTraffic traffic;
+    traffic.images = unpaired_;
+    problem_ = problem = faultOf(traffic, topics());
   }
   tell(problem);
 }
@@ -95,14 +94,13 @@ CameraFrame CameraInput::latest() const
   const std::lock_guard<std::mutex> lock(mutex_);
   if (!latest_.image)
   {
-    throw ImageError("no image from the camera: " + (problem_.empty() ? "none came on " + topics() : problem_));
+    throw ImageError("no image from the camera: " + (problem_.empty() ? "none came on " + topics().both() : problem_));
   }
-  const double age = ageOf(latest_.image->header.stamp);
-  if (!(std::abs(age) <= params_.max_image_age))
+  const std::string fault =
+      faultOfAge(latest_.image->header.stamp, image_subscriber_.getTopic(), params_.max_image_age);
+  if (!fault.empty())
   {
-    throw ImageError("the latest camera image on '" + image_subscriber_.getTopic() + "' is " +
-                     (age > 0.0 ? seconds(age) + " old" : "stamped " + seconds(-age) + " in the future") +
-                     ", ~max_image_age is " + seconds(params_.max_image_age));
+    throw ImageError(fault);
   }
   return latest_;
 }
@@ -169,7 +167,7 @@ void CameraInput::frameCallback(const sensor_msgs::ImageConstPtr& image, const s
 
 void CameraInput::onPair(const sensor_msgs::ImageConstPtr& image, const sensor_msgs::CameraInfoConstPtr& info)
 {
-  const std::string fault = faultOf(*image, *info);
+  const std::string fault = faultOf(*image, *info, topics());
   {
     const std::lock_guard<std::mutex> lock(mutex_);
     ++pairs_;
@@ -191,38 +189,13 @@ void CameraInput::onPair(const sensor_msgs::ImageConstPtr& image, const sensor_m
   }
 }
 
-std::string CameraInput::faultOf(const sensor_msgs::Image& image, const sensor_msgs::CameraInfo& info) const
-{
-  const Camera camera = toCamera(info);
-  const std::string fault = camera.fault();
-  if (!fault.empty())
-  {
-    return fault + ", in " + topics();
-  }
-  if (camera.width != static_cast<int>(image.width) || camera.height != static_cast<int>(image.height))
-  {
-    return "the calibration is for " + std::to_string(camera.width) + " x " + std::to_string(camera.height) +
-           " pixels and the image has " + std::to_string(image.width) + " x " + std::to_string(image.height) + ", in " +
-           topics();
-  }
-  return "";
-}
-
 void CameraInput::checkInputs()
 {
   std::string problem;
   {
     const std::lock_guard<std::mutex> lock(mutex_);
-    if (pairs_ == 0 && images_ > 0 && infos_ > 0)
-    {
-      problem = "no image and camera_info with the same stamp: " + std::to_string(images_) + " and " +
-                std::to_string(infos_) + " messages in " + seconds(CHECK_PERIOD) + " on " + topics();
-    }
-    else if (images_ == 0 && infos_ > 0)
-    {
-      problem = "no image comes on '" + image_subscriber_.getTopic() + "', though camera_info comes on '" +
-                info_subscriber_.getTopic() + "'";
-    }
+    // Images alone are told of by onImage(), as a calibration may come after its image.
+    problem = infos_ > 0 ? faultOf(CameraTraffic{ images_, infos_, pairs_, CHECK_PERIOD }, topics()) : "";
     problem_ = problem.empty() ? problem_ : problem;
     images_ = infos_ = pairs_ = 0;
   }
@@ -242,9 +215,9 @@ void CameraInput::tell(const std::string& problem) const
   }
 }
 
-std::string CameraInput::topics() const
+CameraTopics CameraInput::topics() const
 {
-  return "'" + image_subscriber_.getTopic() + "' and '" + info_subscriber_.getTopic() + "'";
+  return { image_subscriber_.getTopic(), info_subscriber_.getTopic() };
 }
 
 }  // namespace view_servo

@@ -7,28 +7,23 @@
 #include "view_servo/ros/node_base.h"
 
 #include <cmath>
+#include <utility>
 
 namespace view_servo
 {
-OdometryInput::OdometryInput(DriverContext& context, const TransformSource& transforms, const std::string& base_frame,
-                             double timeout, double delay,
-                             const std::function<void(const nav_msgs::Odometry&)>& on_message)
-  : input_(context.addInput("odometry", context.quoted("odom"), timeout)),
-    transforms_(transforms),
-    base_frame_(base_frame),
-    delay_(delay),
-    subscriber_(context.listen<nav_msgs::Odometry>(
-        "odom", 50, [on_message](const nav_msgs::Odometry::ConstPtr& message) { on_message(*message); }))
+OdometryReader::OdometryReader(DriverInput& input, const TransformSource& transforms, std::string base_frame,
+                               double delay)
+  : input_(input), transforms_(transforms), base_frame_(std::move(base_frame)), delay_(delay)
 {
 }
 
-std::string OdometryInput::faultOf(const nav_msgs::Odometry& message, const PlanarPose& pose)
+std::string OdometryReader::faultOf(const nav_msgs::Odometry& message, const PlanarPose& pose, std::uint32_t publishers)
 {
   constexpr double FARTHEST = 1e6;  // [m]
   const std::string name = "odometry on " + input_.topics();
-  if (subscriber_.getNumPublishers() > 1)
+  if (publishers > 1)
   {
-    return std::to_string(subscriber_.getNumPublishers()) + " nodes publish " + name + ": only one may";
+    return std::to_string(publishers) + " nodes publish " + name + ": only one may";
   }
   if (!(std::hypot(pose.x, pose.y) < FARTHEST && std::isfinite(pose.yaw)))
   {
@@ -58,10 +53,10 @@ std::string OdometryInput::faultOf(const nav_msgs::Odometry& message, const Plan
   return "";
 }
 
-std::optional<OdometryReading> OdometryInput::read(const nav_msgs::Odometry& message)
+std::optional<OdometryReading> OdometryReader::read(const nav_msgs::Odometry& message, std::uint32_t publishers)
 {
   const PlanarPose child_pose = toPlanarPose(message);
-  const std::string fault = faultOf(message, child_pose);
+  const std::string fault = faultOf(message, child_pose, publishers);
   if (!fault.empty())
   {
     input_.reject(fault);
@@ -78,7 +73,7 @@ std::optional<OdometryReading> OdometryInput::read(const nav_msgs::Odometry& mes
   return OdometryReading{ place, time, compose(child_pose, *base_in_child_) };
 }
 
-void OdometryInput::setRemainingDelay(double delay)
+void OdometryReader::setRemainingDelay(double delay)
 {
   if (std::isfinite(delay))
   {
@@ -86,7 +81,7 @@ void OdometryInput::setRemainingDelay(double delay)
   }
 }
 
-std::string OdometryInput::adviceOnDelay() const
+std::string OdometryReader::adviceOnDelay() const
 {
   constexpr double LARGE = 0.05;  // [s]
   if (!(std::abs(measured_delay_ - delay_) >= LARGE))
@@ -96,6 +91,15 @@ std::string OdometryInput::adviceOnDelay() const
   return "odometry on " + input_.topics() + " is stamped " + seconds(std::abs(measured_delay_)) +
          (measured_delay_ > 0.0 ? " later" : " earlier") + " than images of the same moment: set ~odometry_delay to " +
          seconds(std::round(100.0 * measured_delay_) / 100.0) + ", or synchronise the clocks";
+}
+
+OdometryInput::OdometryInput(DriverContext& context, const TransformSource& transforms, const std::string& base_frame,
+                             double timeout, double delay,
+                             const std::function<void(const nav_msgs::Odometry&)>& on_message)
+  : OdometryReader(context.addInput("odometry", context.quoted("odom"), timeout), transforms, base_frame, delay),
+    subscriber_(context.listen<nav_msgs::Odometry>(
+        "odom", 50, [on_message](const nav_msgs::Odometry::ConstPtr& message) { on_message(*message); }))
+{
 }
 
 }  // namespace view_servo

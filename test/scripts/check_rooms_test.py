@@ -45,6 +45,8 @@ class CheckRooms(unittest.TestCase):
             ("src/views/planted.cpp", "sensor_msgs/Image.h", "a message from the core"),
             ("src/views/planted.cpp", "view_servo/Heading.h", "a message of our own from the core"),
             ("src/trials/planted.cpp", "ros/ros.h", "ROS from trials"),
+            ("src/check/planted.cpp", "ros/ros.h", "ROS from check"),
+            ("src/check_ros/planted.cpp", "sim/world.h", "the simulation from check_robot"),
             ("src/tracking/planted.cpp", "visp3/core/vpColVector.h", "ViSP elsewhere than in control"),
             ("src/nodes/planted.cpp", "visp3/core/vpColVector.h", "ViSP elsewhere than in control"),
             ("src/nodes/planted.cpp", "../sim/world.h", "a relative path"),

@@ -10,6 +10,7 @@
 #include <std_msgs/Header.h>
 
 #include <map>
+#include <set>
 #include <string>
 
 namespace view_servo
@@ -37,5 +38,8 @@ ServoError toServoError(const ServoReport& report, const ServoTarget& target, bo
  * be read.
  */
 std::map<std::string, JointLimits> jointLimits(const std::string& urdf_xml);
+
+/** Names of a URDF's joints that can move and mimic no other; empty when the text is empty or cannot be read. */
+std::set<std::string> movableJoints(const std::string& urdf_xml);
 
 }  // namespace view_servo

@@ -2,6 +2,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include "view_servo/ros/camera_faults.h"
 #include "view_servo/ros/parameters.h"
 
 #include <diagnostic_updater/DiagnosticStatusWrapper.h>
@@ -95,9 +96,8 @@ private:
   /** Logs a problem and hands it on; nothing when it is empty. The mutex is not held. */
   void tell(const std::string& problem) const;
   void onPair(const sensor_msgs::ImageConstPtr& image, const sensor_msgs::CameraInfoConstPtr& info);
-  std::string faultOf(const sensor_msgs::Image& image, const sensor_msgs::CameraInfo& info) const;
   void checkInputs();
-  std::string topics() const;
+  CameraTopics topics() const;
 
   CameraInputParams params_;
   Callback on_frame_;

@@ -10,6 +10,7 @@
 #include <ros/subscriber.h>
 #include <ros/time.h>
 
+#include <cstdint>
 #include <functional>
 #include <limits>
 #include <optional>
@@ -26,18 +27,18 @@ struct OdometryReading
 };
 
 /**
- * A base's odometry on `odom`: of one publisher, of `~base_frame` or of a frame that tf places on it, with stamps that are
- * corrected by `~odometry_delay`. What cannot be used is rejected, with the reason. Used with the node's mutex held.
+ * Reads a base's odometry: of one publisher, of `~base_frame` or of a frame that tf places on it, with stamps that are
+ * corrected by `~odometry_delay`. What cannot be used is rejected, with the reason. The caller sees to it that one
+ * thread at a time uses it.
  */
-class OdometryInput
+class OdometryReader
 {
 public:
-  /** @param on_message is called with what comes, by runLocked(); it shall call read(). */
-  OdometryInput(DriverContext& context, const TransformSource& transforms, const std::string& base_frame,
-                double timeout, double delay, const std::function<void(const nav_msgs::Odometry&)>& on_message);
+  /** @param input is told of each message. @param delay see `~odometry_delay` [s]. Both references are kept. */
+  OdometryReader(DriverInput& input, const TransformSource& transforms, std::string base_frame, double delay);
 
-  /** @return empty when the message was rejected. */
-  std::optional<OdometryReading> read(const nav_msgs::Odometry& message);
+  /** @param publishers number of nodes that publish odometry. @return empty when the message was rejected. */
+  std::optional<OdometryReading> read(const nav_msgs::Odometry& message, std::uint32_t publishers);
 
   const DriverInput& input() const
   {
@@ -55,7 +56,7 @@ public:
   std::string adviceOnDelay() const;
 
 private:
-  std::string faultOf(const nav_msgs::Odometry& message, const PlanarPose& pose);
+  std::string faultOf(const nav_msgs::Odometry& message, const PlanarPose& pose, std::uint32_t publishers);
 
   DriverInput& input_;
   const TransformSource& transforms_;
@@ -64,6 +65,23 @@ private:
   double measured_delay_ = std::numeric_limits<double>::quiet_NaN();
   std::string child_frame_;                  // whose pose odometry is
   std::optional<PlanarPose> base_in_child_;  // of ~base_frame in that frame
+};
+
+/** A driver's odometry, on `odom`. Used with the node's mutex held. */
+class OdometryInput : public OdometryReader
+{
+public:
+  /** @param on_message is called with what comes, by runLocked(); it shall call read(). */
+  OdometryInput(DriverContext& context, const TransformSource& transforms, const std::string& base_frame,
+                double timeout, double delay, const std::function<void(const nav_msgs::Odometry&)>& on_message);
+
+  /** @return empty when the message was rejected. */
+  std::optional<OdometryReading> read(const nav_msgs::Odometry& message)
+  {
+    return OdometryReader::read(message, subscriber_.getNumPublishers());
+  }
+
+private:
   ros::Subscriber subscriber_;
 };
 

@@ -1,0 +1,51 @@
+// Copyright (c) 2026, the view_servo authors
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <ros/time.h>
+#include <sensor_msgs/CameraInfo.h>
+#include <sensor_msgs/Image.h>
+
+#include <string>
+
+namespace view_servo
+{
+/** @file
+ * Why a camera's messages cannot be used, in one line each; empty when they can. Nodes and check_robot say the same.
+ */
+
+/** Names of a camera's topics as other nodes see them. */
+struct CameraTopics
+{
+  std::string image;
+  std::string info;
+
+  /** Both in quotation marks, for messages. */
+  std::string both() const
+  {
+    return "'" + image + "' and '" + info + "'";
+  }
+};
+
+/** How many messages came on a camera's topics. */
+struct CameraTraffic
+{
+  int images = 0;
+  int infos = 0;
+  int pairs = 0;          ///< of an image and a camera_info with the same stamp
+  double duration = 0.0;  ///< of the time in which they came [s]
+};
+
+/** By the messages that came or did not come; nothing is wrong when none came at all. */
+std::string faultOf(const CameraTraffic& traffic, const CameraTopics& topics);
+
+/** By what is in an image and the camera_info of the same stamp: calibration and sizes. */
+std::string faultOf(const sensor_msgs::Image& image, const sensor_msgs::CameraInfo& info, const CameraTopics& topics);
+
+/**
+ * By an image's stamp. One from the future is as bad as an old one: time jumped back, as when a bag loops.
+ * @param topic of the image. @param max_age as `~max_image_age` [s].
+ */
+std::string faultOfAge(const ros::Time& stamp, const std::string& topic, double max_age);
+
+}  // namespace view_servo

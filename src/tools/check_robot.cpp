@@ -1,0 +1,239 @@
+// Copyright (c) 2026, the view_servo authors
+// SPDX-License-Identifier: BSD-3-Clause
+#include "check/report.h"
+#include "check_ros/robot_check.h"
+#include "check_ros/test_drive.h"
+#include "tools/check_robot_options.h"
+#include "tools/command_line.h"
+#include "view_servo/ros/control_node.h"
+
+#include <poll.h>
+#include <ros/console.h>
+#include <ros/init.h>
+#include <ros/master.h>
+#include <ros/spinner.h>
+#include <unistd.h>
+#include <nlohmann/json.hpp>
+#include <opencv2/imgcodecs.hpp>
+
+#include <cmath>
+#include <cstdint>
+#include <exception>
+#include <iostream>
+#include <string>
+#include <utility>
+#include <vector>
+
+namespace view_servo
+{
+namespace
+{
+using check::Findings;
+
+constexpr int BAD_INPUT = 2;
+constexpr int INTERRUPTED = 130;  // as shells have it
+
+/** Prints findings as they are found, or all of them as one JSON object at the end. */
+class Report
+{
+public:
+  explicit Report(const CheckOptions& options) : options_(options)
+  {
+  }
+
+  void add(const Findings& findings)
+  {
+    append(findings_, findings);
+    if (!options_.json)
+    {
+      std::cout << toLines(findings) << std::flush;
+    }
+  }
+
+  void setPicture(std::string path)
+  {
+    picture_ = std::move(path);
+  }
+
+  /** @return the exit status. */
+  int finish() const
+  {
+    if (options_.json)
+    {
+      std::cout << toJson().dump(2) << std::endl;
+    }
+    else
+    {
+      std::cout << '\n'
+                << summary(findings_) << (picture_.empty() ? "" : "; the camera's picture is in " + picture_)
+                << std::endl;
+    }
+    return exitStatus(findings_);
+  }
+
+private:
+  nlohmann::json toJson() const
+  {
+    nlohmann::json list = nlohmann::json::array();
+    for (const check::Finding& finding : findings_)
+    {
+      list.push_back({ { "level", toText(finding.level) },
+                       { "name", finding.name },
+                       { "message", finding.message },
+                       { "remedy", finding.remedy } });
+    }
+    return { { "status", exitStatus(findings_) },
+             { "robot", options_.setup.is_arm ? "arm_servo" : "homing" },
+             { "picture", picture_ },
+             { "findings", list } };
+  }
+
+  const CheckOptions& options_;
+  Findings findings_;
+  std::string picture_;
+};
+
+/** A line that the user types; empty after two minutes, at the end of the input, and when the program is to end. */
+std::string typedLine()
+{
+  constexpr double PATIENCE = 120.0;  // [s]
+  constexpr int POLL = 50;            // [ms]
+  const double end = check::steadySeconds() + PATIENCE;
+  while (check::steadySeconds() < end && !detail::shutdownRequested())
+  {
+    pollfd input{ STDIN_FILENO, POLLIN, 0 };
+    if (poll(&input, 1, POLL) > 0)
+    {
+      std::string line;
+      std::getline(std::cin, line);
+      return line;
+    }
+  }
+  return "";
+}
+
+/** Writes the camera's picture. @return a warning when that fails. */
+Findings savePicture(const check::RobotCheck& robot, const std::string& path, Report& report)
+{
+  const cv::Mat drawing = path.empty() ? cv::Mat() : robot.drawing();
+  if (drawing.empty())
+  {
+    return {};
+  }
+  try
+  {
+    if (cv::imwrite(path, drawing))
+    {
+      report.setPicture(path);
+      return {};
+    }
+  }
+  catch (const cv::Exception&)
+  {
+    // OpenCV's text names its own source; what matters follows.
+  }
+  return { check::warning("file", "the picture cannot be written to '" + path + "'",
+                          "say --picture FILE.png in a directory of yours") };
+}
+
+Findings move(const check::RobotCheck& robot, const CheckOptions& options, const Findings& before)
+{
+  check::TestDrive test(robot, options.drive, &detail::shutdownRequested);
+  // What is asked goes to standard error: with --json standard output is for the result alone.
+  std::string answer = options.yes ? "drive" : "";
+  if (!options.yes)
+  {
+    std::cerr << "\n--move: " << test.plan() << ", without looking for obstacles. Keep a hand on the emergency stop.\n"
+              << "Type 'drive' to let it drive, 'push' to move it by hand, anything else to end: " << std::flush;
+    answer = typedLine();
+  }
+  if (answer != "drive" && answer != "push")
+  {
+    return { check::warning("move", "not asked for: 'drive' or 'push' was not typed",
+                            "type one of them, or say --yes") };
+  }
+  const std::string refusal = test.refusal(before, answer == "push");
+  if (!refusal.empty())
+  {
+    return { check::error("move", "nothing is moved: " + refusal, "see to that first") };
+  }
+  if (answer == "drive")
+  {
+    return test.drive();
+  }
+  return test.followHand([](const std::string& text) {
+    std::cerr << text << "; then press Enter." << std::endl;
+    typedLine();
+    return !detail::shutdownRequested();
+  });
+}
+
+int run(const CheckOptions& options)
+{
+  Report report(options);
+  if (!ros::master::check())
+  {
+    report.add({ check::error("master", "no ROS master answers at " + ros::master::getURI(),
+                              "start the robot's launch file, or set ROS_MASTER_URI") });
+    return report.finish();
+  }
+  const ros::NodeHandle nh;
+  detail::deferShutdown();
+  const check::RobotCheck robot(nh, options.setup);
+  constexpr std::uint32_t THREADS = 2;
+  ros::AsyncSpinner spinner(THREADS);
+  spinner.start();
+  if (!options.json)
+  {
+    std::cerr << "Listening for " << options.seconds << " s" << std::endl;
+  }
+  check::RobotCheck::listen(options.seconds, &detail::shutdownRequested);
+  if (detail::shutdownRequested())
+  {
+    return INTERRUPTED;
+  }
+  const Findings findings = robot.findings();
+  report.add(findings);
+  report.add(savePicture(robot, options.no_picture ? "" : options.picture, report));
+  if (options.move)
+  {
+    report.add(move(robot, options, findings));
+  }
+  spinner.stop();
+  return detail::shutdownRequested() ? INTERRUPTED : report.finish();
+}
+
+}  // namespace
+}  // namespace view_servo
+
+int main(int argc, char** argv)
+{
+  using namespace view_servo;
+  try
+  {
+    const CheckOptions options = readCheckOptions(argc, argv);
+    if (!options.help.empty())
+    {
+      std::cout << options.help;
+      return 0;
+    }
+    std::vector<std::string> words = options.for_ros;
+    std::vector<char*> pointers;
+    for (std::string& word : words)
+    {
+      pointers.push_back(&word[0]);
+    }
+    int count = static_cast<int>(pointers.size());
+    ros::init(count, pointers.data(), "check_robot",
+              ros::init_options::NoSigintHandler | ros::init_options::AnonymousName);
+    ros::console::set_logger_level(ROSCONSOLE_DEFAULT_NAME, ros::console::levels::Fatal);
+    ros::console::notifyLoggerLevelsChanged();
+    const ExitDeadline exit_deadline(&detail::shutdownRequested);
+    return run(options);
+  }
+  catch (const std::exception& error)
+  {
+    std::cerr << "check_robot: " << oneLine(error.what()) << '\n';
+    return BAD_INPUT;
+  }
+}

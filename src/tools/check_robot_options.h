@@ -1,0 +1,34 @@
+// Copyright (c) 2026, the view_servo authors
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include "check_ros/setup.h"
+#include "check_ros/test_drive.h"
+
+#include <string>
+#include <vector>
+
+namespace view_servo
+{
+/** What the user of check_robot wants. */
+struct CheckOptions
+{
+  check::Setup setup;
+  check::DriveParams drive;
+  double seconds = 10.0;  ///< of listening
+  bool move = false;
+  bool yes = false;  ///< drives without a question
+  bool json = false;
+  bool no_picture = false;
+  std::string picture = "check_robot.png";  ///< file to write the camera's picture to, unless `no_picture`
+  std::string help;                         ///< what to print instead of checking; empty: nothing
+  std::vector<std::string> for_ros;         ///< arguments for ros::init()
+};
+
+/**
+ * Reads the command line: options, `homing` or `arm_servo`, and arguments NAME:=VALUE as the launch file of that name takes
+ * them. Those that do not matter here are passed over. @throws std::runtime_error naming what is wrong, in one line.
+ */
+CheckOptions readCheckOptions(int argc, char** argv);
+
+}  // namespace view_servo
