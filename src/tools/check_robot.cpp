@@ -20,6 +20,7 @@
 #include <cstdint>
 #include <exception>
 #include <iostream>
+#include <optional>
 #include <string>
 #include <utility>
 #include <vector>
@@ -211,13 +212,12 @@ int main(int argc, char** argv)
   using namespace view_servo;
   try
   {
-    const CheckOptions options = readCheckOptions(argc, argv);
-    if (!options.help.empty())
+    const std::optional<CheckOptions> options = readCheckOptions(argc, argv);
+    if (!options)
     {
-      std::cout << options.help;
-      return 0;
+      return 0;  // --help
     }
-    std::vector<std::string> words = options.for_ros;
+    std::vector<std::string> words = options->for_ros;
     std::vector<char*> pointers;
     for (std::string& word : words)
     {
@@ -229,7 +229,7 @@ int main(int argc, char** argv)
     ros::console::set_logger_level(ROSCONSOLE_DEFAULT_NAME, ros::console::levels::Fatal);
     ros::console::notifyLoggerLevelsChanged();
     const ExitDeadline exit_deadline(&detail::shutdownRequested);
-    return run(options);
+    return run(*options);
   }
   catch (const std::exception& error)
   {

@@ -2,20 +2,18 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "tools/check_robot_options.h"
 
-#include <boost/program_options.hpp>
+#include "tools/command_line.h"
 
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
 #include <map>
-#include <sstream>
 #include <stdexcept>
 
 namespace view_servo
 {
 namespace
 {
-namespace po = boost::program_options;
 using check::Setup;
 
 const char* const USAGE =
@@ -25,9 +23,7 @@ const char* const USAGE =
     "\n"
     "NAME:=VALUE are arguments of homing.launch or arm_servo.launch, so the same words can be typed for both:\n"
     "  camera:= image_transport:= cmd_vel:= views_dir:= dry_run:= frame_prefix:=\n"
-    "  and odom:= base_frame:= of a base, joint_states:= odom_frame:= of an arm.\n"
-    "\n"
-    "Exit status: 0 all is well, 1 there are warnings, 2 there are errors.\n";
+    "  and odom:= base_frame:= of a base, joint_states:= odom_frame:= of an arm.";
 
 /** Arguments that both launch files have, or one of them, and that say nothing about how the robot is wired. */
 const std::vector<std::string> PASSED_OVER = { "sim",
@@ -100,16 +96,6 @@ void setArgument(Setup& setup, const std::string& name, const std::string& value
   }
 }
 
-void requireWithin(const std::string& option, double value, double least, double most)
-{
-  if (!(value >= least && value <= most))
-  {
-    std::ostringstream text;
-    text << option << " has to be within " << least << " and " << most << ", not " << value;
-    throw std::runtime_error(text.str());
-  }
-}
-
 /** The command line in three parts. */
 struct Words
 {
@@ -131,71 +117,48 @@ Words sort(int argc, char** argv)
   return words;
 }
 
-po::options_description describe(CheckOptions& options, double& degrees)
-{
-  po::options_description description("Options");
-  const auto add = [&](const char* names, const po::value_semantic* value, const char* meaning) {
-    description.add_options()(names, value, meaning);
-  };
-  description.add_options()("help,h", "print this, and end");
-  add("seconds", po::value(&options.seconds)->default_value(options.seconds, "10"), "listen for so long [s]");
-  add("json", po::bool_switch(&options.json), "print one JSON object instead of lines");
-  add("picture", po::value(&options.picture)->default_value(options.picture),
-      "write the camera's picture with its corners and segments to this file (PNG)");
-  add("no-picture", po::bool_switch(&options.no_picture), "write no picture");
-  add("move", po::bool_switch(&options.move),
-      "then ask to drive a little, or to be pushed by hand, and check signs, scale and direction of odometry, of the "
-      "camera's mount and of commands");
-  add("yes", po::bool_switch(&options.yes), "with --move: drive at once, without a question");
-  add("distance", po::value(&options.drive.distance)->default_value(options.drive.distance, "0.1"),
-      "with --move: how far to drive [m]");
-  add("angle", po::value(&degrees)->default_value(degrees, "10"), "with --move: how far to turn [degrees]");
-  return description;
-}
-
-/** Reads what begins with a dash. @return whether help is wanted. */
-bool parse(const std::vector<std::string>& words, const po::options_description& description, std::string& robot)
-{
-  po::options_description all;
-  all.add(description).add_options()("robot", po::value(&robot));
-  po::positional_options_description positions;
-  positions.add("robot", 1);
-  po::variables_map values;
-  po::store(po::command_line_parser(words).options(all).positional(positions).run(), values);
-  po::notify(values);
-  return values.count("help") > 0;
-}
-
 }  // namespace
 
-CheckOptions readCheckOptions(int argc, char** argv)
+std::optional<CheckOptions> readCheckOptions(int argc, char** argv)
 {
   CheckOptions options;
-  std::string robot = "homing";
   double degrees = 10.0;
+  CommandLine line(USAGE, "Exit status: 0 all is well, 1 there are warnings, 2 there are errors.");
+  line.number("seconds", options.seconds, { 1.0, 3600.0 }, "Listen for so long [s]");
+  line.flag("json", options.json, "Print one JSON object instead of lines");
+  line.text("picture", options.picture,
+            "Write the camera's picture with its corners and segments to this file (PNG); default: " + options.picture);
+  line.flag("no-picture", options.no_picture, "Write no picture");
+  line.flag("move", options.move,
+            "Then ask to drive a little, or to be pushed by hand, and check signs, scale and direction of odometry, of "
+            "the camera's mount and of commands");
+  line.flag("yes", options.yes, "With --move: drive at once, without a question");
+  line.number("distance", options.drive.distance, { 0.02, 0.2 }, "With --move: how far to drive [m]");
+  line.number("angle", degrees, { 3.0, 15.0 }, "With --move: how far to turn [degrees]");
+
   const Words words = sort(argc, argv);
+  std::vector<const char*> for_options{ argv[0] };
+  for (const std::string& word : words.options)
+  {
+    for_options.push_back(word.c_str());
+  }
+  const auto robots = line.parse(static_cast<int>(for_options.size()), for_options.data());
+  if (!robots)
+  {
+    return std::nullopt;
+  }
+  const std::string robot = robots->empty() ? "homing" : robots->front();
+  if (robots->size() > 1 || (robot != "homing" && robot != "arm_servo" && robot != "arm"))
+  {
+    throw CommandLineError("'" + robots->back() + "' is no launch file: say homing or arm_servo");
+  }
   options.for_ros = words.for_ros;
-  const po::options_description description = describe(options, degrees);
-  if (parse(words.options, description, robot))
-  {
-    std::ostringstream text;
-    text << USAGE << '\n' << description;
-    options.help = text.str();
-    return options;
-  }
-  if (robot != "homing" && robot != "arm_servo" && robot != "arm")
-  {
-    throw std::runtime_error("'" + robot + "' is no launch file: say homing or arm_servo");
-  }
   options.setup.is_arm = robot != "homing";
   for (const std::string& argument : words.arguments)
   {
     const std::size_t split = argument.find(":=");
     setArgument(options.setup, argument.substr(0, split), argument.substr(split + 2));
   }
-  requireWithin("--seconds", options.seconds, 1.0, 3600.0);
-  requireWithin("--distance", options.drive.distance, 0.02, 0.2);
-  requireWithin("--angle", degrees, 3.0, 15.0);
   options.drive.angle = degrees * M_PI / 180.0;
   return options;
 }

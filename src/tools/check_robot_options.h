@@ -5,6 +5,7 @@
 #include "check_ros/setup.h"
 #include "check_ros/test_drive.h"
 
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -21,14 +22,14 @@ struct CheckOptions
   bool json = false;
   bool no_picture = false;
   std::string picture = "check_robot.png";  ///< file to write the camera's picture to, unless `no_picture`
-  std::string help;                         ///< what to print instead of checking; empty: nothing
   std::vector<std::string> for_ros;         ///< arguments for ros::init()
 };
 
 /**
  * Reads the command line: options, `homing` or `arm_servo`, and arguments NAME:=VALUE as the launch file of that name takes
- * them. Those that do not matter here are passed over. @throws std::runtime_error naming what is wrong, in one line.
+ * them. Those that do not matter here are passed over. @return nothing when help was asked for, and has been printed.
+ * @throws std::runtime_error naming what is wrong, in one line.
  */
-CheckOptions readCheckOptions(int argc, char** argv);
+std::optional<CheckOptions> readCheckOptions(int argc, char** argv);
 
 }  // namespace view_servo
