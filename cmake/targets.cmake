@@ -70,18 +70,11 @@ function(vs_executable name)
 endfunction()
 
 # export_library(NAME): a library without ROS, which projects that know no catkin find as the package view_servo_NAME, with
-# the target view_servo::NAME, in the devel space and in the install space.
+# the target view_servo::NAME, in the devel space and in the install space. It is installed as EXPORT view_servo_NAME-targets.
 function(export_library name)
   set(package ${PROJECT_NAME}_${name})
   set(folder lib/cmake/${package})
   set_target_properties(${package} PROPERTIES EXPORT_NAME ${name})
-  install(
-    TARGETS ${package}
-    EXPORT ${package}-targets
-    ARCHIVE DESTINATION ${CATKIN_PACKAGE_LIB_DESTINATION}
-    LIBRARY DESTINATION ${CATKIN_PACKAGE_LIB_DESTINATION}
-    RUNTIME DESTINATION ${CATKIN_GLOBAL_BIN_DESTINATION}
-  )
   install(EXPORT ${package}-targets NAMESPACE ${PROJECT_NAME}:: DESTINATION ${folder})
   install(FILES cmake/${package}-config.cmake DESTINATION ${folder})
   export(EXPORT ${package}-targets NAMESPACE ${PROJECT_NAME}:: FILE ${CATKIN_DEVEL_PREFIX}/${folder}/${package}-targets.cmake)

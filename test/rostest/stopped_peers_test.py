@@ -1,0 +1,119 @@
+#!/usr/bin/python3
+# Copyright (c) 2026, the view_servo authors
+# SPDX-License-Identifier: BSD-3-Clause
+"""Whole runs during which the nodes that tell a driver where its view is are stopped for a while by SIGSTOP, as a machine
+that is short of memory or processors does: the robot stands, says why, and arrives after they go on."""
+import os
+import shutil
+import signal
+import sys
+import tempfile
+import time
+import unittest
+import xmlrpc.client
+
+import rospy
+from geometry_msgs.msg import Twist, TwistStamped
+
+ROOT = os.path.realpath(os.path.join(os.path.dirname(os.path.abspath(__file__)), "..", ".."))
+sys.path.insert(0, os.path.join(ROOT, "test", "docs"))
+import graph  # noqa: E402
+
+from view_servo.msg import ServoStatus  # noqa: E402
+
+PATIENCE = 180.0  # [s]
+STOPPED = 2.0  # how long [s]
+
+
+def is_zero(twist):
+    return not any((twist.linear.x, twist.linear.y, twist.linear.z, twist.angular.x, twist.angular.y, twist.angular.z))
+
+
+class StoppedPeers(unittest.TestCase):
+    @classmethod
+    def setUpClass(cls):
+        cls.directory = tempfile.mkdtemp(prefix="view_servo_stopped_peers_")
+        cls.graph = graph.Graph(cls.directory)
+        os.environ.update(ROS_MASTER_URI=cls.graph.uri, ROS_HOSTNAME="localhost")
+        rospy.init_node("stopped_peers", disable_signals=True)
+
+    @classmethod
+    def tearDownClass(cls):
+        rospy.signal_shutdown("the test has ended")
+        cls.graph.stop()
+        shutil.rmtree(cls.directory, ignore_errors=True)
+
+    def setUp(self):
+        self.commands = []  # (steady time, twist)
+        self.statuses = []
+        self.stopped = []
+        self.subscribers = []
+
+    def tearDown(self):
+        for subscriber in self.subscribers:
+            subscriber.unregister()
+        for pid in self.stopped:
+            os.kill(pid, signal.SIGCONT)
+
+    def pid_of(self, node):
+        return xmlrpc.client.ServerProxy(self.graph.master.lookupNode(graph.CALLER, node)[2]).getPid(graph.CALLER)[2]
+
+    def moves(self):
+        return bool(self.commands) and not is_zero(self.commands[-1][1])
+
+    def stop(self, nodes):
+        self.stopped = [self.pid_of(node) for node in nodes]
+        for pid in self.stopped:
+            os.kill(pid, signal.SIGSTOP)
+        return time.monotonic()
+
+    def go_on(self):
+        while self.stopped:
+            os.kill(self.stopped.pop(), signal.SIGCONT)
+
+    def listen(self, message, twist_of):
+        def take_command(command):
+            self.commands.append((time.monotonic(), twist_of(command)))
+
+        self.subscribers = [rospy.Subscriber("/cmd_vel", message, take_command, queue_size=1000),
+                            rospy.Subscriber("/status", ServoStatus, self.statuses.append, queue_size=1000)]
+
+    def begin(self, launch_file):
+        """@return the process of roslaunch and the file that tells the outcome, when the robot moves."""
+        result = os.path.join(self.directory, launch_file + ".result")
+        process = self.graph.start("roslaunch", "--wait", "view_servo", launch_file, "result:=" + result)
+        graph.wait_until("motion", self.moves, PATIENCE)
+        return process, result
+
+    def assert_arrives(self, process, result):
+        process.wait(PATIENCE)
+        with open(result) as outcome:
+            self.assertTrue(outcome.read().startswith("0"), self.graph.log())
+        self.assertTrue(is_zero(self.commands[-1][1]))
+        self.assertTrue(all(status.reason for status in self.statuses))
+
+    def test_arm(self):
+        self.listen(TwistStamped, lambda command: command.twist)
+        process, result = self.begin("arm_servo.launch")
+        since = self.stop(["/homography_tracker"])
+        graph.wait_until("a stand", lambda: not self.moves(), 5.0)
+        graph.wait_until("the end of the pause", lambda: time.monotonic() > since + STOPPED)
+        self.assertFalse(self.moves())
+        last_motion = max(moment for moment, twist in self.commands if not is_zero(twist))
+        self.assertLess(last_motion - since, 1.0)
+        self.assertEqual(self.statuses[-1].state, ServoStatus.LOST)
+        self.assertNotEqual(self.statuses[-1].reason, "")
+        self.go_on()
+        self.assert_arrives(process, result)
+
+    def test_base(self):
+        self.listen(Twist, lambda command: command)
+        process, result = self.begin("homing.launch")
+        since = self.stop(["/point_matcher", "/line_matcher"])
+        graph.wait_until("the end of the pause", lambda: time.monotonic() > since + STOPPED)
+        self.go_on()
+        self.assert_arrives(process, result)
+
+
+if __name__ == "__main__":
+    unittest.main(argv=sys.argv[:1], warnings="ignore")  # of rospy
