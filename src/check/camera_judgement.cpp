@@ -128,8 +128,10 @@ Finding judgeStamps(const CameraObservations& camera)
   }
   if (!camera.age_fault.empty())
   {
-    return error(name, camera.age_fault,
-                 "synchronise the clocks of this computer and the camera's (chrony), and look at use_sim_time");
+    return error(
+        name, camera.age_fault,
+        "synchronise the clocks of this computer and the camera's (chrony), look at use_sim_time, or find out what "
+        "delays the images");
   }
   if (images.age < -FUTURE)
   {

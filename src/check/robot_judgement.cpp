@@ -68,7 +68,8 @@ Finding judgeClocks(const OdometryObservations& odometry, double image_age)
   const std::string name = "clocks";
   if (!odometry.apart_fault.empty())
   {
-    return error(name, odometry.apart_fault, "synchronise the machines' clocks (chrony), or set ~odometry_delay");
+    return error(name, odometry.apart_fault,
+                 "synchronise the machines' clocks (chrony), set ~odometry_delay, or find out what delays the images");
   }
   const double ahead = image_age - odometry.stream.age;
   const std::string found = "odometry's stamps are " + shortTime(std::abs(ahead)) +
