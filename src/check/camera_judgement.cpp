@@ -9,8 +9,6 @@ namespace view_servo::check
 {
 namespace
 {
-const char* const DRIVER = "correct what the camera's driver publishes";
-
 Finding judgeImages(const CameraObservations& camera)
 {
   constexpr double SLOW = 5.0;     // [Hz]
