@@ -61,7 +61,7 @@ function(vs_executable name)
   target_link_libraries(${target} PRIVATE ${ARG_LIBS})
   if(ARG_NODE)
     # Of headers that are precompiled GCC warns although they are not ours: it takes parts of boost for uninitialized.
-    target_compile_options(${target} PRIVATE $<$<CXX_COMPILER_ID:GNU>:-Wno-maybe-uninitialized>)
+    target_compile_options(${target} PRIVATE $<$<CXX_COMPILER_ID:GNU>:-Wno-maybe-uninitialized> -Wno-uninitialized)
     precompile(${target} NODES <actionlib/server/action_server.h> <diagnostic_updater/diagnostic_updater.h>
       <image_transport/image_transport.h> <message_filters/time_synchronizer.h> <ros/ros.h> <sensor_msgs/CameraInfo.h>
       <sensor_msgs/Image.h> <tf2_ros/transform_listener.h> <opencv2/core.hpp> <Eigen/Geometry>)
