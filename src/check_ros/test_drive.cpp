@@ -137,7 +137,7 @@ std::string TestDrive::findPose(Place& place) const
     return place.base ? "" : "no odometry has come that belongs to the newest image";
   }
   const std::string fixed_frame = robot_.setup().fixedFrame();
-  const std::string missing = robot_.transforms().missing(fixed_frame, header.frame_id, header.stamp);
+  std::string missing = robot_.transforms().missing(fixed_frame, header.frame_id, header.stamp);
   if (missing.empty())
   {
     place.camera = toIsometry(robot_.transforms().lookUp(fixed_frame, header.frame_id, header.stamp, 0.0).transform);
@@ -303,7 +303,9 @@ Findings TestDrive::followHand(const Prompt& prompt)
     const std::string amount =
         turn > 0.0 ? number(turn / DEGREE, 0) + " degrees" : number(100.0 * part.way.norm(), 0) + " cm";
     std::string fault = look(here);
-    if (fault.empty() && !prompt("Move the " + what + " by hand: " + part.name + ", by about " + amount))
+    std::string wish = "Move the ";
+    wish.append(what).append(" by hand: ").append(part.name).append(", by about ").append(amount);
+    if (fault.empty() && !prompt(wish))
     {
       return findings;
     }
