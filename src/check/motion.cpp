@@ -11,6 +11,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
+#include <iterator>
 #include <limits>
 #include <utility>
 #include <vector>
@@ -72,6 +73,29 @@ double difference(const Motion& a, const Motion& b)
   const Eigen::Vector3d direction_b = unitOrZero(b.translation);
   return std::atan2(direction_a.cross(direction_b).norm(), direction_a.dot(direction_b)) +
          (a.rotation - b.rotation).norm();
+}
+
+/**
+ * Where a camera turned and did not move, noise alone makes the plane and the translation that its homography is
+ * decomposed into, and they may be impossible ones. @return none when a turn does not explain the pairs.
+ */
+std::optional<Motion> turnAlone(const Eigen::Matrix3d& h, const Correspondences& pairs, double focal_length)
+{
+  Points before;
+  std::transform(pairs.begin(), pairs.end(), std::back_inserter(before),
+                 [](const Correspondence& pair) { return pair.reference; });
+  const Eigen::Matrix3d turn = nearestRotation(calibratedHomography(h, Eigen::Matrix3d::Identity(), before));
+  std::vector<double> errors;
+  for (const Correspondence& pair : pairs)
+  {
+    errors.push_back(focal_length * ((turn * pair.reference.homogeneous()).hnormalized() - pair.current).norm());
+  }
+  if (median(std::move(errors)) > MAX_ERROR)
+  {
+    return std::nullopt;
+  }
+  const Eigen::AngleAxisd rotation(Eigen::Matrix3d(turn.transpose()));  // of the camera; the points turn the other way
+  return Motion{ Eigen::Vector3d::Zero(), rotation.angle() * rotation.axis() };
 }
 
 }  // namespace
@@ -170,6 +194,10 @@ SeenMotion seenByHand(const ImagePair& images, const Motion& measured)
       least = difference(motion, measured);
       seen.motion = motion;
     }
+  }
+  if (!seen.motion)
+  {
+    seen.motion = turnAlone(*h, pairs, images.camera.k(0, 0));
   }
   seen.fault = seen.motion ? "" : "the homography between the images before and after is not that of a plane";
   return seen;

@@ -51,7 +51,7 @@ SeenMotion seenByBase(const ImagePair& images, const CameraMount& mount, const P
 
 /**
  * Of a camera, by the homography of the plane that most matches lie on. Two motions explain a homography; the one nearer
- * to `measured` is taken.
+ * to `measured` is taken. Where none is possible and a turn explains the matches, the camera has turned alone.
  */
 SeenMotion seenByHand(const ImagePair& images, const Motion& measured);
 

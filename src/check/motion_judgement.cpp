@@ -114,6 +114,11 @@ Finding judgeLeg(const Leg& leg)
     return warning(name, by + "; " + leg.seen.fault, "let the camera see more texture, and nothing that moves");
   }
   const Eigen::Vector3d& seen = part(leg, *leg.seen.motion);
+  if (seen.isZero())
+  {
+    return warning(name, by + "; the images show a turn instead",
+                   "let the camera see something nearer, so that a move looks other than a turn");
+  }
   const double off = angleBetween(measured, seen);
   const std::string found =
       by + (leg.turns ? ", " + amount(leg, (off < M_PI_2 ? 1.0 : -1.0) * seen.norm()) + " by images"

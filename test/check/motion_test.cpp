@@ -54,6 +54,8 @@ TEST(CheckMotion, JudgesWhoIsWrong)
   unseen.seen.fault = "the images before and after have only 3 matches that agree";
   Leg pushed = slide(y, 1.6 * y, y);
   pushed.by_hand = true;
+  Leg turned_only = slide(y, y, y);
+  turned_only.seen.motion = Motion{ ZERO, 5.0 * DEGREE * Eigen::Vector3d::UnitZ() };
   struct Case
   {
     Leg leg;
@@ -71,6 +73,7 @@ TEST(CheckMotion, JudgesWhoIsWrong)
     { slide(y, y, y + 0.5 * x), Level::WARNING, "its yaw" },
     { unseen, Level::WARNING, "only 3 matches" },
     { pushed, Level::OK, "by hand" },
+    { turned_only, Level::WARNING, "show a turn instead" },
     { turn(10.0, 9.8, 10.1), Level::OK, "10.1 degrees by images" },
     { turn(10.0, -10.0, 10.0), Level::ERROR, "command and images contradict odometry" },
     { turn(10.0, 10.0, -10.0), Level::ERROR, "command and odometry contradict the images" },
@@ -172,10 +175,21 @@ TEST(CheckMotion, SeesAHandMove)
     ASSERT_TRUE(mirrored.motion) << mirrored.fault;
     EXPECT_GT(mirrored.motion->translation.dot(way.normalized()), 0.5) << mirrored.motion->translation.transpose();
   }
-  const SeenMotion rolled =
-      seenByHand(scene.pair(pose(ZERO, 10.0 * DEGREE)), { ZERO, 10.0 * DEGREE * Eigen::Vector3d::UnitZ() });
-  ASSERT_TRUE(rolled.motion) << rolled.fault;
-  EXPECT_NEAR(rolled.motion->rotation.z(), 10.0 * DEGREE, 0.3 * DEGREE);
+}
+
+TEST(CheckMotion, SeesThatAHandOnlyTurned)
+{
+  Scene scene("rice");
+  for (double degrees = -12.0; degrees <= 12.0; degrees += 0.75)
+  {
+    const double angle = degrees * DEGREE;
+    const SeenMotion rolled = seenByHand(scene.pair(pose(ZERO, angle)), { ZERO, angle * Eigen::Vector3d::UnitZ() });
+    if (std::abs(degrees) > 1.0)
+    {
+      ASSERT_TRUE(rolled.motion) << degrees << ": " << rolled.fault;
+      EXPECT_NEAR(rolled.motion->rotation.z(), angle, 0.3 * DEGREE);
+    }
+  }
 }
 
 }  // namespace
