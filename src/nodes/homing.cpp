@@ -88,6 +88,7 @@ public:
           },
           [this](const std::string& problem) { context_.locked([&] { images_.reject(problem); }); })
   {
+    images_.setMaxAge(params.camera.max_image_age);
     context.diagnostics().add("camera", &camera_, &CameraInput::diagnose);
     want(params_.view, "");
     context.listen<PointMatches>("point_matches", 1, [this](const PointMatches::ConstPtr& m) {

@@ -4,6 +4,7 @@
 
 #include "view_servo/WantedView.h"
 
+#include <algorithm>
 #include <cmath>
 #include <stdexcept>
 
@@ -19,10 +20,15 @@ DriverInput::Stamp DriverInput::checkStamp(const ros::Time& stamp)
     reject(name + ": no stamp, it is all zero");
     return Stamp::UNUSABLE;
   }
-  const double ahead = -ageOf(stamp);
-  if (ahead > MAX_AHEAD)
+  const double age = ageOf(stamp);
+  if (age > max_age_)
   {
-    reject(name + ": stamped " + seconds(ahead) + " in the future");
+    reject(name + ": stamped " + seconds(age) + " ago, at most " + seconds(max_age_) + " are allowed");
+    return Stamp::UNUSABLE;
+  }
+  if (-age > std::min(max_age_, MAX_AHEAD))
+  {
+    reject(name + ": stamped " + seconds(-age) + " in the future");
     return Stamp::UNUSABLE;
   }
   switch (order_.check(stamp))

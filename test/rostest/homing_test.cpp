@@ -302,6 +302,18 @@ TEST_F(HomingTest, RefusesAndStopsForOdometryOfAnotherTime)
   expectToEnd([this] { robot_.odometry_offset = 0.0; }, GoalState::ABORTED, "gone back");
 }
 
+TEST_F(HomingTest, StopsForImagesThatAreOldAsOdometryIs)
+{
+  drive();
+  // Gradually, so that time does not go back.
+  const auto delay_more = [this] {
+    robot_.delay = std::min(1.5, robot_.delay + 0.005);
+  };
+  EXPECT_TRUE(waitUntil([this] { return reason().find(" ago, at most 1 s") != std::string::npos; }, delay_more))
+      << reason();
+  EXPECT_TRUE(waitUntil([this] { return !commands_.moving(); }));
+}
+
 TEST_F(HomingTest, DrivesThoughOdometryComesInTheWrongOrder)
 {
   robot_.shuffles = true;

@@ -14,6 +14,7 @@
 
 #include <cstdint>
 #include <functional>
+#include <limits>
 #include <memory>
 #include <mutex>
 #include <string>
@@ -56,7 +57,7 @@ public:
   {
     NEWEST,
     LATE,     ///< a newer one has come before
-    UNUSABLE  ///< zero, far in the future, the same as before, or far behind: reject() was called
+    UNUSABLE  ///< zero, too old, far in the future, the same as before, or far behind: reject() was called
   };
   /**
    * Checks the stamp of what has come. When time has gone back, as when a bag loops, jump() says so afterwards and the stamp
@@ -83,6 +84,12 @@ public:
   void setNeeded(bool needed)
   {
     needed_ = needed;
+  }
+
+  /** Sets by how much stamps may differ from ROS' time, in the past or in the future [s]; without a call 600 s ahead. */
+  void setMaxAge(double age)
+  {
+    max_age_ = age;
   }
 
   /** What is missing, in one line; empty: nothing. */
@@ -113,6 +120,7 @@ private:
   std::string problem_;
   std::string jump_;
   StampOrder order_;
+  double max_age_ = std::numeric_limits<double>::infinity();
   bool came_ = false;
   bool needed_ = true;
 };
@@ -147,10 +155,6 @@ public:
     return diagnostics_;
   }
 
-  const CommandGate& gate() const
-  {
-    return gate_;
-  }
   /** Where commands go. */
   std::string commandTopic() const
   {
