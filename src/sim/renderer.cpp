@@ -12,6 +12,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
+#include <cstdlib>
 #include <stdexcept>
 #include <utility>
 
@@ -43,6 +44,10 @@ struct SimulatedCamera::Context
   explicit Context(const cv::Size& wanted) : size(wanted)
   {
     constexpr int DEPTH_BITS = 24;
+    // Mesa's threads, by default one for each core, wait for each other at every picture: where other nodes use the cores,
+    // too, one is quicker. Who sets the variable has the last word.
+    constexpr int KEEP_WHAT_IS_SET = 0;
+    setenv("LP_NUM_THREADS", "1", KEEP_WHAT_IS_SET);
     context = OSMesaCreateContextExt(OSMESA_RGBA, DEPTH_BITS, 0, 0, nullptr);
     buffer.resize(4 * static_cast<std::size_t>(size.area()));
     if (context == nullptr)

@@ -123,7 +123,7 @@ TEST(HomingTrial, FindsHowFarTheClocksOfOdometryAndCameraAreApart)
     params.conditions.odometry_delay = delay;
     HomingTrials trials(world, params);
     double found = NAN;
-    const HomingOutcome outcome = trials.run(fromGoal(world, { -0.5, 0.1, 20.0 * DEGREE }),
+    const HomingOutcome outcome = trials.run(fromGoal(world, { -0.25, 0.05, 20.0 * DEGREE }),
                                              [&](const HomingStep& step) { found = step.report.odometry_delay; });
     SCOPED_TRACE(delay);
     expectArrival(outcome, 0.02, 1.0 * DEGREE);
@@ -146,7 +146,7 @@ TEST(HomingTrial, ArrivesThroughLensesThatBend)
     world.camera.distortion = coefficients;
     HomingTrials trials(world, HomingTrialParams());
     SCOPED_TRACE(model);
-    expectArrival(trials.run(fromGoal(world, { -0.8, 0.25, 5.0 * DEGREE })), 0.01, 0.5 * DEGREE);
+    expectArrival(trials.run(fromGoal(world, { -0.4, 0.15, 5.0 * DEGREE })), 0.01, 0.5 * DEGREE);
   }
 }
 
