@@ -12,9 +12,12 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
+#include <array>
 #include <atomic>
 #include <cmath>
 #include <csignal>
+#include <cstdint>
+#include <cstdio>
 #include <fstream>
 #include <iterator>
 #include <limits>
@@ -138,6 +141,19 @@ std::string errorOf(const Action& action)
     return error.what();
   }
   return "no error";
+}
+
+/** The store's checksum, for whoever forges one. */
+std::string fnv1a(const std::string& bytes)
+{
+  std::uint64_t hash = 0xcbf29ce484222325U;
+  for (const char byte : bytes)
+  {
+    hash = (hash ^ static_cast<unsigned char>(byte)) * 0x100000001b3U;
+  }
+  std::array<char, 17> text{};
+  std::snprintf(text.data(), text.size(), "%016llx", static_cast<unsigned long long>(hash));
+  return text.data();
 }
 
 #define EXPECT_ERROR(action, part) \
@@ -423,6 +439,24 @@ TEST_F(DamagedViewTest, AnotherViewsImage)
 {
   fs::copy_file(file("good.", ".png"), file("bad.", ".png"), fs::copy_options::overwrite_existing);
   expectOnlyBadDamaged("does not agree with the checksum");
+}
+
+/** A few bytes that decode to a gigabyte, with all checksums right: only the size in the header gives them away. */
+TEST_F(DamagedViewTest, ImageWithABombsHeader)
+{
+  using namespace std::string_literals;
+  const fs::path image = file("bad.", ".png");
+  const fs::path yaml = file("bad.", ".yaml");
+  const std::string bytes = readBytes(image).replace(16, 8, "\0\0\x7D\0\0\0\x7D\0"s);
+  const std::string old_name = image.filename().string();
+  const std::string new_name = "bad." + fnv1a(bytes) + ".png";
+  fs::remove(image);
+  writeBytes(image.parent_path() / new_name, bytes);
+  std::string text = readBytes(yaml);
+  text.replace(text.find(old_name), old_name.size(), new_name);
+  text.resize(text.find("checksum: "));
+  writeBytes(yaml, text + "checksum: " + fnv1a(text) + "\n");
+  expectOnlyBadDamaged("32000 x 32000 pixels");
 }
 
 TEST_F(DamagedViewTest, MissingImage)
