@@ -81,6 +81,170 @@ MultiHypothesisParams PairGeometry::hypothesisParams() const
   return hypotheses;
 }
 
+// ------------------------------------------------------------------------------------------------------- the models
+
+namespace
+{
+/** Homography of a plane: x_cur ~ H x_ref; its error is the mean of the squared transfer errors in the two images. */
+class PlanePair : public PairGeometry
+{
+public:
+  PlanePair(const PointViewMatcherParams& params, double threshold) : PairGeometry(params, threshold)
+  {
+  }
+
+  std::optional<PairFit> fitCandidates(const std::vector<Association>& candidates, const Correspondences& pairs,
+                                       RansacStatistics& statistics, Rng& rng) const override
+  {
+    return toFit(ransac(HomographyEstimator(pairs), ransacParams(), rng), candidates, statistics);
+  }
+
+  std::optional<PairFit> fitAssociation(const AssociationMatrix& association, const Points& reference,
+                                        const Points& current, RansacStatistics& statistics, Rng& rng) const override
+  {
+    return toFit(estimateHomography(association, reference, current, ransacParams(), hypothesisParams(), rng),
+                 statistics);
+  }
+
+  Eigen::Matrix3d refine(const Eigen::Matrix3d& matrix, const Correspondences& pairs) const override
+  {
+    return refineHomography(matrix, pairs, HUBER_WIDTH);
+  }
+
+  int sampleSize() const override
+  {
+    return HomographyEstimator::SAMPLE_SIZE;
+  }
+
+  double squaredError(const Eigen::Matrix3d& matrix, const Correspondence& pair) const override
+  {
+    return 0.5 * symmetricTransferError(matrix, matrix.inverse(), pair);
+  }
+
+  /** Candidates that agree, moved to where a corner's warped patch fits best, and corners that only patches find. */
+  std::vector<CornerMatch> findAlong(const Eigen::Matrix3d& matrix, const LevelData& level) const override
+  {
+    // Candidates that agree, ...
+    std::vector<std::optional<CornerMatch>> of_row(level.reference_corners.size());
+    for (const CornerMatch& candidate : level.candidates)
+    {
+      if (agrees(matrix, level.correspondence(candidate)))
+      {
+        of_row[static_cast<std::size_t>(candidate.row)] = candidate;
+      }
+    }
+    // ... with the more exact position of their patch where there is one, and what only the patches find.
+    for (const GuidedMatch& match : searchAlongHomography(level.reference_image, level.reference_corners,
+                                                          level.current_image, matrix, threshold(), params_.guidance))
+    {
+      std::optional<CornerMatch>& known = of_row[static_cast<std::size_t>(match.reference)];
+      known = CornerMatch{ match.reference, match.current, known ? known->score : 0.0 };
+    }
+    std::vector<CornerMatch> matches;
+    for (const std::optional<CornerMatch>& match : of_row)
+    {
+      if (match)
+      {
+        matches.push_back(*match);
+      }
+    }
+    return matches;
+  }
+
+  Eigen::Matrix3d ofFullImages(const Eigen::Matrix3d& matrix, const Eigen::Matrix3d& reference_to_full,
+                               const Eigen::Matrix3d& current_to_full) const override
+  {
+    return normalizedHomography(current_to_full * matrix * reference_to_full.inverse());
+  }
+
+  std::string name() const override
+  {
+    return "homography";
+  }
+
+private:
+  double agreeingArea(const cv::Size& /*current*/) const override
+  {
+    return M_PI * threshold() * threshold();
+  }
+};
+
+/** Epipolar geometry of a scene with depth: x_curᵀ F x_ref = 0; its error is the squared Sampson distance. */
+class EpipolarPair : public PairGeometry
+{
+public:
+  EpipolarPair(const PointViewMatcherParams& params, double threshold) : PairGeometry(params, threshold)
+  {
+  }
+
+  std::optional<PairFit> fitCandidates(const std::vector<Association>& candidates, const Correspondences& pairs,
+                                       RansacStatistics& statistics, Rng& rng) const override
+  {
+    return toFit(ransac(FundamentalEstimator(pairs, viewThreshold()), ransacParams(), rng), candidates, statistics);
+  }
+
+  std::optional<PairFit> fitAssociation(const AssociationMatrix& association, const Points& reference,
+                                        const Points& current, RansacStatistics& statistics, Rng& rng) const override
+  {
+    return toFit(
+        estimateFundamental(association, reference, current, ransacParams(), hypothesisParams(), rng, viewThreshold()),
+        statistics);
+  }
+
+  Eigen::Matrix3d refine(const Eigen::Matrix3d& matrix, const Correspondences& pairs) const override
+  {
+    return polishFundamental(matrix, pairs, HUBER_WIDTH);
+  }
+
+  int sampleSize() const override
+  {
+    return FundamentalEstimator::SAMPLE_SIZE;
+  }
+
+  double squaredError(const Eigen::Matrix3d& matrix, const Correspondence& pair) const override
+  {
+    return sampsonError(matrix, pair);
+  }
+
+  /** The best one-to-one matches of corners near each other's epipolar lines. */
+  std::vector<CornerMatch> findAlong(const Eigen::Matrix3d& matrix, const LevelData& level) const override
+  {
+    std::vector<CornerMatch> matches;
+    for (const Association& match : maximumWeightMatching(associateAlongFundamental(
+             level.association, level.reference_corners, level.current_corners, matrix, threshold())))
+    {
+      matches.push_back(level.toMatch({ match.row, match.column, level.association.weight(match.row, match.column) }));
+    }
+    return matches;
+  }
+
+  Eigen::Matrix3d ofFullImages(const Eigen::Matrix3d& matrix, const Eigen::Matrix3d& reference_to_full,
+                               const Eigen::Matrix3d& current_to_full) const override
+  {
+    return (current_to_full.inverse().transpose() * matrix * reference_to_full.inverse()).normalized();
+  }
+
+  std::string name() const override
+  {
+    return "fundamental matrix";
+  }
+
+private:
+  double agreeingArea(const cv::Size& current) const override
+  {
+    const double diagonal = std::hypot(current.width, current.height);
+    return 2.0 * threshold() * diagonal;
+  }
+
+  /** Largest violation of the view constraint by a sample (thesis 6.3, method 2); 0: not tested. */
+  double viewThreshold() const
+  {
+    return params_.view_consistency == ViewConsistency::WITHIN ? params_.consistency.threshold : 0.0;
+  }
+};
+
+}  // namespace
+
 std::unique_ptr<PairGeometry> makePairGeometry(GeometryModel model, const PointViewMatcherParams& params,
                                                double threshold)
 {
@@ -89,147 +253,6 @@ std::unique_ptr<PairGeometry> makePairGeometry(GeometryModel model, const PointV
     return std::make_unique<PlanePair>(params, threshold);
   }
   return std::make_unique<EpipolarPair>(params, threshold);
-}
-
-// -------------------------------------------------------------------------------------------------------- homography
-
-std::optional<PairFit> PlanePair::fitCandidates(const std::vector<Association>& candidates,
-                                                const Correspondences& pairs, RansacStatistics& statistics,
-                                                Rng& rng) const
-{
-  return toFit(ransac(HomographyEstimator(pairs), ransacParams(), rng), candidates, statistics);
-}
-
-std::optional<PairFit> PlanePair::fitAssociation(const AssociationMatrix& association, const Points& reference,
-                                                 const Points& current, RansacStatistics& statistics, Rng& rng) const
-{
-  return toFit(estimateHomography(association, reference, current, ransacParams(), hypothesisParams(), rng),
-               statistics);
-}
-
-Eigen::Matrix3d PlanePair::refine(const Eigen::Matrix3d& matrix, const Correspondences& pairs) const
-{
-  return refineHomography(matrix, pairs, HUBER_WIDTH);
-}
-
-int PlanePair::sampleSize() const
-{
-  return HomographyEstimator::SAMPLE_SIZE;
-}
-
-double PlanePair::squaredError(const Eigen::Matrix3d& matrix, const Correspondence& pair) const
-{
-  return 0.5 * symmetricTransferError(matrix, matrix.inverse(), pair);
-}
-
-std::vector<CornerMatch> PlanePair::findAlong(const Eigen::Matrix3d& matrix, const LevelData& level) const
-{
-  // Candidates that agree, ...
-  std::vector<std::optional<CornerMatch>> of_row(level.reference_corners.size());
-  for (const CornerMatch& candidate : level.candidates)
-  {
-    if (agrees(matrix, level.correspondence(candidate)))
-    {
-      of_row[static_cast<std::size_t>(candidate.row)] = candidate;
-    }
-  }
-  // ... with the more exact position of their patch where there is one, and what only the patches find.
-  for (const GuidedMatch& match : searchAlongHomography(level.reference_image, level.reference_corners,
-                                                        level.current_image, matrix, threshold(), params_.guidance))
-  {
-    std::optional<CornerMatch>& known = of_row[static_cast<std::size_t>(match.reference)];
-    known = CornerMatch{ match.reference, match.current, known ? known->score : 0.0 };
-  }
-  std::vector<CornerMatch> matches;
-  for (const std::optional<CornerMatch>& match : of_row)
-  {
-    if (match)
-    {
-      matches.push_back(*match);
-    }
-  }
-  return matches;
-}
-
-Eigen::Matrix3d PlanePair::ofFullImages(const Eigen::Matrix3d& matrix, const Eigen::Matrix3d& reference_to_full,
-                                        const Eigen::Matrix3d& current_to_full) const
-{
-  return normalizedHomography(current_to_full * matrix * reference_to_full.inverse());
-}
-
-std::string PlanePair::name() const
-{
-  return "homography";
-}
-
-double PlanePair::agreeingArea(const cv::Size& /*current*/) const
-{
-  return M_PI * threshold() * threshold();
-}
-
-// ------------------------------------------------------------------------------------------------ fundamental matrix
-
-std::optional<PairFit> EpipolarPair::fitCandidates(const std::vector<Association>& candidates,
-                                                   const Correspondences& pairs, RansacStatistics& statistics,
-                                                   Rng& rng) const
-{
-  return toFit(ransac(FundamentalEstimator(pairs, viewThreshold()), ransacParams(), rng), candidates, statistics);
-}
-
-std::optional<PairFit> EpipolarPair::fitAssociation(const AssociationMatrix& association, const Points& reference,
-                                                    const Points& current, RansacStatistics& statistics, Rng& rng) const
-{
-  return toFit(
-      estimateFundamental(association, reference, current, ransacParams(), hypothesisParams(), rng, viewThreshold()),
-      statistics);
-}
-
-Eigen::Matrix3d EpipolarPair::refine(const Eigen::Matrix3d& matrix, const Correspondences& pairs) const
-{
-  return polishFundamental(matrix, pairs, HUBER_WIDTH);
-}
-
-int EpipolarPair::sampleSize() const
-{
-  return FundamentalEstimator::SAMPLE_SIZE;
-}
-
-double EpipolarPair::squaredError(const Eigen::Matrix3d& matrix, const Correspondence& pair) const
-{
-  return sampsonError(matrix, pair);
-}
-
-std::vector<CornerMatch> EpipolarPair::findAlong(const Eigen::Matrix3d& matrix, const LevelData& level) const
-{
-  std::vector<CornerMatch> matches;
-  for (const Association& match : maximumWeightMatching(associateAlongFundamental(
-           level.association, level.reference_corners, level.current_corners, matrix, threshold())))
-  {
-    matches.push_back(level.toMatch({ match.row, match.column, level.association.weight(match.row, match.column) }));
-  }
-  return matches;
-}
-
-Eigen::Matrix3d EpipolarPair::ofFullImages(const Eigen::Matrix3d& matrix, const Eigen::Matrix3d& reference_to_full,
-                                           const Eigen::Matrix3d& current_to_full) const
-{
-  return (current_to_full.inverse().transpose() * matrix * reference_to_full.inverse()).normalized();
-}
-
-std::string EpipolarPair::name() const
-{
-  return "fundamental matrix";
-}
-
-double EpipolarPair::agreeingArea(const cv::Size& current) const
-{
-  const double diagonal = std::hypot(current.width, current.height);
-  return 2.0 * threshold() * diagonal;
-}
-
-double EpipolarPair::viewThreshold() const
-{
-  return params_.view_consistency == ViewConsistency::WITHIN ? params_.consistency.threshold : 0.0;
 }
 
 }  // namespace view_servo

@@ -122,58 +122,6 @@ private:
   const double threshold_;
 };
 
-/** Homography of a plane: x_cur ~ H x_ref; its error is the mean of the squared transfer errors in the two images. */
-class PlanePair : public PairGeometry
-{
-public:
-  PlanePair(const PointViewMatcherParams& params, double threshold) : PairGeometry(params, threshold)
-  {
-  }
-
-  std::optional<PairFit> fitCandidates(const std::vector<Association>& candidates, const Correspondences& pairs,
-                                       RansacStatistics& statistics, Rng& rng) const override;
-  std::optional<PairFit> fitAssociation(const AssociationMatrix& association, const Points& reference,
-                                        const Points& current, RansacStatistics& statistics, Rng& rng) const override;
-  Eigen::Matrix3d refine(const Eigen::Matrix3d& matrix, const Correspondences& pairs) const override;
-  int sampleSize() const override;
-  double squaredError(const Eigen::Matrix3d& matrix, const Correspondence& pair) const override;
-  /** Candidates that agree, moved to where a corner's warped patch fits best, and corners that only patches find. */
-  std::vector<CornerMatch> findAlong(const Eigen::Matrix3d& matrix, const LevelData& level) const override;
-  Eigen::Matrix3d ofFullImages(const Eigen::Matrix3d& matrix, const Eigen::Matrix3d& reference_to_full,
-                               const Eigen::Matrix3d& current_to_full) const override;
-  std::string name() const override;
-
-private:
-  double agreeingArea(const cv::Size& current) const override;
-};
-
-/** Epipolar geometry of a scene with depth: x_curᵀ F x_ref = 0; its error is the squared Sampson distance. */
-class EpipolarPair : public PairGeometry
-{
-public:
-  EpipolarPair(const PointViewMatcherParams& params, double threshold) : PairGeometry(params, threshold)
-  {
-  }
-
-  std::optional<PairFit> fitCandidates(const std::vector<Association>& candidates, const Correspondences& pairs,
-                                       RansacStatistics& statistics, Rng& rng) const override;
-  std::optional<PairFit> fitAssociation(const AssociationMatrix& association, const Points& reference,
-                                        const Points& current, RansacStatistics& statistics, Rng& rng) const override;
-  Eigen::Matrix3d refine(const Eigen::Matrix3d& matrix, const Correspondences& pairs) const override;
-  int sampleSize() const override;
-  double squaredError(const Eigen::Matrix3d& matrix, const Correspondence& pair) const override;
-  /** The best one-to-one matches of corners near each other's epipolar lines. */
-  std::vector<CornerMatch> findAlong(const Eigen::Matrix3d& matrix, const LevelData& level) const override;
-  Eigen::Matrix3d ofFullImages(const Eigen::Matrix3d& matrix, const Eigen::Matrix3d& reference_to_full,
-                               const Eigen::Matrix3d& current_to_full) const override;
-  std::string name() const override;
-
-private:
-  double agreeingArea(const cv::Size& current) const override;
-  /** Largest violation of the view constraint by a sample (thesis 6.3, method 2); 0: not tested. */
-  double viewThreshold() const;
-};
-
 /** The geometry of a model. Keeps a reference to `params`. @param threshold largest error of an inlier [px]. */
 std::unique_ptr<PairGeometry> makePairGeometry(GeometryModel model, const PointViewMatcherParams& params,
                                                double threshold);
