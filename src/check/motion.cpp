@@ -4,6 +4,7 @@
 
 #include "view_servo/geometry/euclidean_homography.h"
 #include "view_servo/geometry/homography.h"
+#include "view_servo/robust/median.h"
 #include "view_servo/robust/planar_motion_estimator.h"
 #include "view_servo/robust/ransac.h"
 #include "view_servo/views/point_view_matcher.h"
@@ -40,17 +41,6 @@ std::string faultOf(const SeenMotion& seen)
     return "the images before and after have only " + std::to_string(seen.matches) + " matches that agree";
   }
   return seen.shift < SMALLEST_SHIFT ? "the picture hardly changed, by " + number(seen.shift, 1) + " px" : "";
-}
-
-double median(std::vector<double> values)
-{
-  if (values.empty())
-  {
-    return 0.0;
-  }
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
 }
 
 PlanarPose scaled(PlanarPose pose, double length)
@@ -90,7 +80,7 @@ std::optional<Motion> turnAlone(const Eigen::Matrix3d& h, const Correspondences&
   {
     errors.push_back(focal_length * ((turn * pair.reference.homogeneous()).hnormalized() - pair.current).norm());
   }
-  if (median(std::move(errors)) > MAX_ERROR)
+  if (medianOf(std::move(errors)) > MAX_ERROR)
   {
     return std::nullopt;
   }
@@ -140,7 +130,7 @@ SeenMotion seenByBase(const ImagePair& images, const CameraMount& mount, const P
   {
     agreeing.push_back(shifts[static_cast<std::size_t>(i)]);
   }
-  seen.shift = median(std::move(agreeing));
+  seen.shift = agreeing.empty() ? 0.0 : medianOf(std::move(agreeing));
   seen.fault = faultOf(seen);
   if (!found.model || !seen.fault.empty())
   {
@@ -173,7 +163,7 @@ SeenMotion seenByHand(const ImagePair& images, const Motion& measured)
     }
   }
   seen.matches = static_cast<int>(pairs.size());
-  seen.shift = median(std::move(shifts));
+  seen.shift = shifts.empty() ? 0.0 : medianOf(std::move(shifts));
   seen.fault = faultOf(seen);
   const std::optional<Eigen::Matrix3d> h = seen.fault.empty() ? homographyFromPoints(pairs) : std::nullopt;
   if (!h)

@@ -5,11 +5,13 @@
 #include "view_servo/features/corners.h"
 #include "view_servo/features/line_segments.h"
 #include "view_servo/images/image_io.h"
+#include "view_servo/robust/median.h"
 
 #include <opencv2/imgproc.hpp>
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 #include <vector>
 
 namespace view_servo::check
@@ -71,9 +73,7 @@ double edgeWidth(const cv::Mat& grey)
   {
     return std::numeric_limits<double>::quiet_NaN();
   }
-  const auto middle = widths.begin() + static_cast<std::ptrdiff_t>(widths.size() / 2);
-  std::nth_element(widths.begin(), middle, widths.end());
-  return *middle;
+  return medianOf(std::move(widths));
 }
 
 PictureMeasures measurePicture(const cv::Mat& grey)

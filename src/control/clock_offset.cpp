@@ -3,6 +3,7 @@
 #include "view_servo/control/clock_offset.h"
 
 #include "view_servo/geometry/planar_pose.h"
+#include "view_servo/robust/median.h"
 
 #include <algorithm>
 #include <cmath>
@@ -37,13 +38,6 @@ void append(Samples& samples, double stamp, double yaw, double kept)
   }
 }
 
-double median(std::vector<double> values)
-{
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
-}
-
 /**
  * Mean turn of the view that no turn of the base explains. @param turn_error by which part odometry may turn too much or too
  * little.
@@ -64,7 +58,7 @@ double unexplained(const std::vector<double>& views, const std::vector<double>& 
   std::vector<double> angles(views.size());
   std::transform(views.begin(), views.end(), bases.begin(), angles.begin(),
                  [&](double view, double base) { return view + scale * base; });
-  const double middle = median(angles);
+  const double middle = medianOf(angles);
   return std::accumulate(angles.begin(), angles.end(), 0.0,
                          [&](double sum, double angle) { return sum + std::abs(angle - middle); }) /
          count;

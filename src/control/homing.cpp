@@ -462,7 +462,7 @@ std::vector<Parameter> rowsOfHoming(HomingParams& params)
          "least correlation of the gradients where homing may end"),
     real("docking_displacement", params.docking_displacement, "px", "> 0",
          "median displacement of the view's points below which homing docks"),
-    real("step", params.step, "m", "> 0", "thesis: way between two headings"),
+    real("step", params.step, "m", "> 0", "thesis: length of a step, after which it looks for the heading again"),
     real("near_step", params.near_step, "m", "> 0", "thesis: the same after the rise of the correlation"),
     real("step_speed", params.step_speed, "m/s", "> 0", "thesis: speed of a step"),
   };

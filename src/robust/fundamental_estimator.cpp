@@ -2,6 +2,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "view_servo/robust/fundamental_estimator.h"
 
+#include "view_servo/robust/median.h"
 #include "view_servo/robust/random.h"
 #include "view_servo/robust/view_consistency.h"
 
@@ -40,10 +41,7 @@ Correspondences nearest(const Eigen::Matrix3d& matrix, const Correspondences& pa
   {
     distances.push_back(std::sqrt(sampsonError(matrix, pair)));
   }
-  std::vector<double> order = distances;
-  const auto middle = order.begin() + static_cast<std::ptrdiff_t>(order.size() / 2);
-  std::nth_element(order.begin(), middle, order.end());
-  const double reach = std::max(DEVIATIONS * *middle, NOISE);
+  const double reach = std::max(DEVIATIONS * medianOf(distances), NOISE);
   Correspondences kept;
   for (std::size_t i = 0; i < pairs.size(); ++i)
   {

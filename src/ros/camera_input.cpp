@@ -86,7 +86,7 @@ void CameraInput::onImage()
     traffic.images = unpaired_;
     problem_ = problem = faultOf(traffic, topics());
   }
-  tell(problem);
+  reportProblem(problem);
 }
 
 CameraFrame CameraInput::latest() const
@@ -199,10 +199,10 @@ void CameraInput::checkInputs()
     problem_ = problem.empty() ? problem_ : problem;
     images_ = infos_ = pairs_ = 0;
   }
-  tell(problem);
+  reportProblem(problem);
 }
 
-void CameraInput::tell(const std::string& problem) const
+void CameraInput::reportProblem(const std::string& problem) const
 {
   if (problem.empty())
   {

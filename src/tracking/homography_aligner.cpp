@@ -69,7 +69,7 @@ std::optional<Eigen::Matrix3d> mostAgreed(const Correspondences& pairs, const Ho
 /** The region, or the whole view when that is empty. @throws std::invalid_argument when something cannot be used. */
 cv::Rect checkedRegion(const cv::Mat& reference, const cv::Rect& region, const HomographyAlignerParams& params)
 {
-  requireNoFaults("parameters of the homography tracker", params.validate());
+  requireNoFaults("parameters of the homography aligner", params.validate());
   if (reference.empty() || reference.type() != CV_8UC1)
   {
     throw std::invalid_argument("the stored view is not an 8-bit grey image");

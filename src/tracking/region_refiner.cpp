@@ -4,6 +4,7 @@
 
 #include "patch.h"
 #include "view_servo/geometry/homography.h"
+#include "view_servo/robust/median.h"
 
 #include <Eigen/LU>
 #include <opencv2/imgproc.hpp>
@@ -24,13 +25,6 @@ cv::Mat smoothed(const cv::Mat& image)
   cv::Mat result;
   cv::GaussianBlur(image, result, cv::Size(5, 5), SIGMA);
   return result;
-}
-
-double medianDeviation(std::vector<double> deviations)
-{
-  const auto middle = deviations.begin() + static_cast<std::ptrdiff_t>(deviations.size() / 2);
-  std::nth_element(deviations.begin(), middle, deviations.end());
-  return *middle;
 }
 
 }  // namespace
@@ -209,7 +203,7 @@ std::optional<Eigen::Matrix3d> RegionRefiner::solve(const std::vector<SeenBlock>
   {
     deviations.push_back(block.deviation);
   }
-  const double width = WIDTH * std::max(medianDeviation(std::move(deviations)), 1e-3);
+  const double width = WIDTH * std::max(medianOf(std::move(deviations)), 1e-3);
   Matrix8 normal = Matrix8::Zero();
   Vector8 right = Vector8::Zero();
   for (const SeenBlock& block : seen)

@@ -36,7 +36,7 @@ public:
 
   explicit CommandsOf(const std::string& topic)
   {
-    subscriber_ = ros::NodeHandle().subscribe<Message>(topic, 100, &CommandsOf::take, this);
+    subscriber_ = ros::NodeHandle().subscribe<Message>(topic, 100, &CommandsOf::onMessage, this);
   }
 
   /** Whether the newest one moves the robot. */
@@ -89,7 +89,7 @@ private:
     Message message;
   };
 
-  void take(const typename Message::ConstPtr& message)
+  void onMessage(const typename Message::ConstPtr& message)
   {
     const std::lock_guard<std::mutex> lock(mutex_);
     list_.push_back({ Clock::now(), *message });

@@ -94,7 +94,7 @@ private:
   void frameCallback(const sensor_msgs::ImageConstPtr& image, const sensor_msgs::CameraInfoConstPtr& info);
   void onImage();
   /** Logs a problem and hands it on; nothing when it is empty. The mutex is not held. */
-  void tell(const std::string& problem) const;
+  void reportProblem(const std::string& problem) const;
   void onPair(const sensor_msgs::ImageConstPtr& image, const sensor_msgs::CameraInfoConstPtr& info);
   void checkInputs();
   CameraTopics topics() const;

@@ -16,7 +16,7 @@
 
 namespace view_servo
 {
-/** Options of the homography tracker. */
+/** Options of the homography aligner. */
 struct HomographyAlignerParams
 {
   int max_points = 200;          ///< corners of the stored view that are looked for
