@@ -24,8 +24,8 @@ double gradientSimilarity(const cv::Mat& reference, const cv::Mat& current);
 /** Options of the arrival detector. */
 struct ArrivalDetectorParams
 {
-  double rise = 1.0;       ///< least sudden rise of the similarity, in standard deviations of those before it
-  double min_rise = 0.08;  ///< least sudden rise, whatever their deviation [1]
+  double rise = 1.0;  ///< a rise of the similarity counts as sudden above so many standard deviations of those before
+  double min_rise = 0.08;  ///< least rise that counts as sudden, however little they deviate [similarity]
   double drop = 0.1;       ///< the view has been passed when the similarity has lost this part of its rise again
   int min_history = 5;     ///< similarities that must be known before a rise counts
 

@@ -8,10 +8,10 @@
 namespace view_servo
 {
 /**
- * How far the stamps of odometry and images are apart, from the turns of a base: what the images say of them has to be what
- * odometry says, at another time. Only turns that begin, end or change tell; those of one speed look the same at all times.
- * Where the begin of a turn is not seen, odometry that turns 5 % too much looks as if it were 50 ms late. Times are those of
- * the messages [s], angles are [rad].
+ * How far the stamps of odometry and images are apart, from the turns of a base: what the images say of them has to be
+ * what odometry says, at another time. Only turns that begin, end or change tell; those of one speed look the same at
+ * all times. Where the begin of a turn is not seen, odometry that turns 5 % too much looks as if it were 50 ms late.
+ * Times are those of the messages [s], angles are [rad].
  */
 class ClockOffset
 {
@@ -23,8 +23,8 @@ public:
   void addImage(double stamp, double view_yaw);
 
   /**
-   * Odometry's stamp minus the image's for one and the same moment [s], within +-LARGEST; by the last seconds. Empty while
-   * the base has not turned enough to tell.
+   * Odometry's stamp minus the image's for one and the same moment [s], within +-LARGEST; by the last seconds. Empty
+   * while the base has not turned enough to tell.
    */
   std::optional<double> estimate() const;
 

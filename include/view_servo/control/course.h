@@ -24,17 +24,17 @@ struct Course
   Kind kind = STAND;
 
   // TO_VIEW.
-  PlanarPose view;                                             ///< base pose at the view, in odometry's frame
-  double gain = 1.0;                                           ///< speed per distance [1/s]
-  double turn_gain = 1.0;                                      ///< turn rate per yaw error [1/s]
-  double min_speed = 0.0;                                      ///< however near the view is [m/s]
-  double max_speed = std::numeric_limits<double>::infinity();  ///< however far the view is [m/s]
+  PlanarPose view;         ///< base pose at the view, in odometry's frame
+  double gain = 1.0;       ///< the base's speed divided by its distance from the view [1/s]
+  double turn_gain = 1.0;  ///< the base's turn rate divided by its yaw error [1/s]
+  double min_speed = 0.0;  ///< the base is no slower, however near the view is [m/s]
+  double max_speed = std::numeric_limits<double>::infinity();  ///< the base is no faster, however far the view is [m/s]
 
   // STEP.
   PlanarPose start;      ///< base pose at its beginning, in odometry's frame
-  double heading = 0.0;  ///< in the base's frame there [rad]
-  double length = 0.0;   ///< [m]
-  double speed = 0.0;    ///< [m/s]
+  double heading = 0.0;  ///< direction to drive in, in the frame of `start`, 0 = ahead, positive to the left [rad]
+  double length = 0.0;   ///< distance to drive [m]
+  double speed = 0.0;    ///< speed on the way; the base slows down near the end [m/s]
 };
 
 /** The velocity of a base that follows a course, before limits. */

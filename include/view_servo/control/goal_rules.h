@@ -31,11 +31,11 @@ struct Circumstances
 {
   bool shutting_down = false;  ///< the node ends
   bool replaced = false;       ///< another goal has come
-  bool enabled = true;
-  bool cancelled = false;
-  bool has_listener = true;  ///< somebody listens to the commands, or nobody needs to
-  double elapsed = 0.0;      ///< since the goal was accepted [s]
-  double timeout = 0.0;      ///< time limit of the goal [s]
+  bool enabled = true;         ///< the gate lets commands through, or it is a dry run
+  bool cancelled = false;      ///< somebody has cancelled the goal
+  bool has_listener = true;    ///< somebody listens to the commands, or nobody needs to
+  double elapsed = 0.0;        ///< since the goal was accepted [s]
+  double timeout = 0.0;        ///< time limit of the goal [s]
   std::string fault;  ///< why the driver's state cannot be trusted any more: time went back, an exception; empty: none
   std::string missing_input;  ///< which input does not come, and since when; empty: all come
   double missing_for = 0.0;   ///< time since it last came [s]

@@ -25,14 +25,15 @@ enum class CameraMotion
 /** Options of the hypotheses of where the stored view is. */
 struct HeadingHypothesesParams
 {
-  CameraMotion motion = CameraMotion::PLANAR;
-  double inlier_threshold = 3.0;  ///< largest error of a match that supports one [px]
+  CameraMotion motion = CameraMotion::PLANAR;  ///< which motions of the camera are looked for
+  double inlier_threshold = 3.0;  ///< largest Sampson distance of a match that agrees with a hypothesis [px]
   double max_yaw = 0.6;           ///< largest turn between the views that is looked for [rad]
-  double min_significance = 6.0;  ///< of a new one: -log10 of the number of false alarms to be expected
-  double memory = 0.7;            ///< part of its weight that one keeps from one set of matches to the next
+  /** Least -log10 of the expected number of false alarms, for a motion to become a hypothesis. */
+  double min_significance = 6.0;
+  double memory = 0.7;            ///< part of its weight that a hypothesis keeps from one set of matches to the next
   int max_hypotheses = 5;         ///< hypotheses kept at most, those of most weight
   double assumed_distance = 1.0;  ///< distance of the view until it is known [m]
-  std::uint64_t seed = 1;
+  std::uint64_t seed = 1;         ///< fixes all random draws
 
   /** All faults, one a line; empty when the parameters are usable. */
   std::vector<std::string> validate() const;
@@ -44,12 +45,19 @@ std::vector<Parameter> parameters(HeadingHypothesesParams& params);
 /** A place where the stored view may have been taken. */
 struct HeadingHypothesis
 {
-  PlanarPose view_in_odom;    ///< of the view's level camera, whose distance from the last camera pose is a guess
-  PlanarPose view_in_camera;  ///< as seen from the last camera pose, of distance 1
-  double weight = 0.0;        ///< share of the matches that agree, plus memory times the weight before
-  int updates = 0;            ///< sets of matches that agreed with it
-  RelativePose motion;        ///< X_cur = R X_ref + t, of which view_in_camera is the part on the floor
-  Correspondences support;    ///< last matches that agree
+  /**
+   * Pose of the view's level camera in odometry's frame [m, rad]. Matches give its direction; its distance from the
+   * camera is assumed at first, and later follows from odometry and that assumption.
+   */
+  PlanarPose view_in_odom;
+  /** Pose of the view's level camera in the level camera of the last set of matches, scaled to distance 1. */
+  PlanarPose view_in_camera;
+  /** After each set: the weight before it times `memory`, plus the share of its matches that agree, if enough do. */
+  double weight = 0.0;
+  int updates = 0;  ///< number of sets of matches of which enough agreed with it
+  /** X_cur = R X_ref + t between the level cameras of the view and of the last set of which enough matches agreed. */
+  RelativePose motion;
+  Correspondences support;  ///< level points of the last set that agree; empty when these are too few
 };
 
 /**

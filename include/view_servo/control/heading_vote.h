@@ -12,11 +12,14 @@
 
 namespace view_servo
 {
-/** Matched level points (planar_motion.h), each with the weight that the matcher gives it. */
+/**
+ * Matched points, each with the weight that the matcher gives it. They are level points (planar_motion.h), except
+ * between the matcher's message and Homing::addMatches(), where they are pixels of the raw images.
+ */
 struct HeadingEvidence
 {
   Correspondences pairs;
-  std::vector<double> weights;  ///< one for each, >= 0
+  std::vector<double> weights;  ///< one for each pair, >= 0
 };
 
 /** Options of the heading vote. */

@@ -79,21 +79,31 @@ enum class HomingState
 /** What homing knows after an image; numbers that it does not know are NaN. */
 struct HomingReport
 {
-  double stamp = 0.0;  ///< of the image
+  double stamp = 0.0;  ///< of the last image [s]
   HomingState state = HomingState::ACQUIRING;
-  std::string reason;                                         ///< of the state, in one line
-  bool at_view = false;                                       ///< within arrival_distance and arrival_yaw
-  double heading = std::numeric_limits<double>::quiet_NaN();  ///< direction to the view's base pose, in base_link [rad]
-  double yaw_error = std::numeric_limits<double>::quiet_NaN();  ///< angle left to turn [rad]
-  double distance = std::numeric_limits<double>::quiet_NaN();   ///< left to drive [m]
-  double confidence = 0.0;                                      ///< share of the matches or points that agree, [0, 1]
+  std::string reason;    ///< of the state, in one line
+  bool at_view = false;  ///< within arrival_distance and arrival_yaw, and the image looks like it
+  /** Direction to the view's base pose in base_link, positive to the left [rad]. */
+  double heading = std::numeric_limits<double>::quiet_NaN();
+  double yaw_error = std::numeric_limits<double>::quiet_NaN();  ///< angle left to turn, positive to the left [rad]
+  double distance = std::numeric_limits<double>::quiet_NaN();   ///< distance left to drive [m]
+  /**
+   * Share of the matches (mode SERVO: or tracked points) that agree, [0, 1]; mode THESIS: of the votes in the chosen
+   * bin.
+   */
+  double confidence = 0.0;
+  /** HeadingHistogram::votes() of the last matches used, over headings of the camera; empty before. */
   std::vector<double> histogram;
-  double roi_min = std::numeric_limits<double>::quiet_NaN();  ///< where the next heading is expected [rad]
-  double roi_max = std::numeric_limits<double>::quiet_NaN();
+  /** Smallest heading at which the view is expected next [rad]; mode SERVO: in base_link, THESIS: of the camera. */
+  double roi_min = std::numeric_limits<double>::quiet_NaN();
+  double roi_max = std::numeric_limits<double>::quiet_NaN();     ///< the largest such heading [rad]
   double similarity = std::numeric_limits<double>::quiet_NaN();  ///< gradientSimilarity(), in [-1, 1]
-  double displacement = std::numeric_limits<
-      double>::quiet_NaN();  ///< median distance of the view's points from their places in the view [px]
-  int inliers = 0;
+  /**
+   * Median distance of the view's points from their places in the view, in the last image in which they were found
+   * [px].
+   */
+  double displacement = std::numeric_limits<double>::quiet_NaN();
+  int inliers = 0;  ///< number of matches or points that agree; mode THESIS: of all matches
   /** How much later than images odometry is stamped; see ClockOffset [s]. */
   double odometry_delay = std::numeric_limits<double>::quiet_NaN();
 };
@@ -104,10 +114,10 @@ Progress toProgress(const HomingReport& report);
 /** What homing goes back to. */
 struct HomingTarget
 {
-  cv::Mat image;       ///< 8-bit, one channel
-  Camera camera;       ///< without a fault; of the current images
-  Camera view_camera;  ///< the same of `image`
-  CameraMount mount;
+  cv::Mat image;       ///< the stored view; 8-bit, one channel
+  Camera camera;       ///< calibration of the current images; it has no fault
+  Camera view_camera;  ///< calibration of `image`; it has no fault
+  CameraMount mount;   ///< where the camera is on the base
 };
 
 /**
@@ -132,8 +142,9 @@ public:
   }
 
   /**
-   * Matches of an image, in pixels of the raw images (`reference` is in the stored one), with a weight each. They may come
-   * after newer images, and from several matchers in turn.
+   * Matches of an image. They may come after newer images, and from several matchers in turn.
+   * @param pixels in the raw images, `reference` in the stored one.
+   * @param weights one for each match, >= 0: how much the matcher trusts it.
    */
   void addMatches(double stamp, const Correspondences& pixels, const std::vector<double>& weights);
 

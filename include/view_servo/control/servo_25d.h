@@ -51,16 +51,16 @@ struct PlaneView
 {
   double stamp = 0.0;              ///< of the image [s]
   EuclideanHomography motion;      ///< X_cur = R X_ref + t
-  std::optional<double> distance;  ///< d, of the plane from the stored view [m]
-  int inliers = 0;
+  std::optional<double> distance;  ///< d, of the plane from the stored view [m]; empty until it is known
+  int inliers = 0;                 ///< number of points that agree with the homography
 };
 
 /** The error of 2.5D servoing (Malis, Chaumette & Boudet 1999). */
 struct Servo25dError
 {
   Eigen::Vector2d point;     ///< (x - x*, y - y*) of the chosen point, in normalised coordinates
-  double depth = 0.0;        ///< log(Z / Z*) of the chosen point
-  Eigen::Vector3d rotation;  ///< θu by which the camera is turned from where it was stored [rad]
+  double depth = 0.0;        ///< log(Z / Z*) of the chosen point: its depth now over that in the stored view
+  Eigen::Vector3d rotation;  ///< θu, axis times angle: by it the camera is turned from where the view was stored [rad]
 };
 
 /** @param point the chosen point (x*, y*) of the stored view, in normalised coordinates. */
@@ -79,15 +79,21 @@ enum class ServoState
 struct ServoReport
 {
   ServoState state = ServoState::ACQUIRING;
-  std::string reason = "looks for the view";                            ///< one line
-  double translation_error = std::numeric_limits<double>::quiet_NaN();  ///< distance of the camera from the view [m]
-  double rotation_error =
-      std::numeric_limits<double>::quiet_NaN();  ///< angle by which the camera is turned from the view [rad]
+  std::string reason = "looks for the view";  ///< one line
+  /** Distance of the camera from the view [m], by the distance of the plane that is assumed until it is known. */
+  double translation_error = std::numeric_limits<double>::quiet_NaN();
+  /** Angle by which the camera is turned from the view [rad]. */
+  double rotation_error = std::numeric_limits<double>::quiet_NaN();
   double point_error = std::numeric_limits<double>::quiet_NaN();  ///< distance of the chosen point from its place [px]
-  std::optional<Servo25dError> error;
-  Eigen::Vector2d point = Eigen::Vector2d::Constant(std::numeric_limits<double>::quiet_NaN());  ///< where it is [px]
-  Eigen::Vector2d gains = Eigen::Vector2d::Ones();  ///< the adaptive ones, of x and y, in [0, 1]
-  int inliers = 0;
+  std::optional<Servo25dError> error;  ///< of the last image with the plane; empty before one
+  /** Where the chosen point is [px]. */
+  Eigen::Vector2d point = Eigen::Vector2d::Constant(std::numeric_limits<double>::quiet_NaN());
+  /**
+   * How much the margin slows turning and changes of depth, for the chosen point's x and y, in [0, 1]: 0 is at the
+   * margin, 1 is free. The smaller of the two counts.
+   */
+  Eigen::Vector2d gains = Eigen::Vector2d::Ones();
+  int inliers = 0;  ///< of the last image's homography; 0 when the plane was not found
 };
 
 /** How far a goal has come. While it drives the reason stays the same, though numbers change. */
@@ -130,7 +136,7 @@ public:
    */
   void addLoss(double stamp, const std::string& reason);
 
-  /** The twist that was sent, and holds from a time on [s]. */
+  /** Tells which twist was sent to the camera. @param time from which on the camera follows it [s]. */
   void sent(double time, const Twist& twist);
 
   /** The twist wanted at a time [s], before limits; zero unless the state is SERVOING or CONVERGED. */

@@ -18,9 +18,9 @@ struct CornerParams
   int max_corners = 500;            ///< the strongest are kept
   double derivative_sigma = 0.7;    ///< Gaussian derivative scale [px]
   double integration_sigma = 1.4;   ///< Gaussian window of the second-moment matrix [px]
-  double k = 0.04;                  ///< in R = det(M) - k tr(M)²
+  double k = 0.04;                  ///< the weight of the trace in R = det(M) - k tr(M)²
   double min_distance = 2.0;        ///< no two corners closer than this [px]
-  double relative_threshold = 0.0;  ///< smallest response as a fraction of the strongest
+  double relative_threshold = 0.0;  ///< weaker corners are left out: smallest response, as a fraction of the strongest
   int border = 4;                   ///< no corners closer than this to the image's border [px]
 
   /** All faults, one a line; empty when the parameters are usable. */

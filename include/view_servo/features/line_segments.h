@@ -30,8 +30,8 @@ struct LineSegmentParams
   double high_threshold = 4.0;     ///< CANNY: see EdgeParams [grey levels/px]
   double min_deviation = 0.6;      ///< CANNY: smaller deviations from a straight line are noise [px]
   double max_deviation = 0.8;      ///< CANNY: no segment deviates more from its edge [px]
-  double min_significance = 20.0;  ///< CANNY: least length over greatest deviation
-  double min_length = 15.0;        ///< [px]
+  double min_significance = 20.0;  ///< CANNY: least ratio of a segment's length to its greatest deviation
+  double min_length = 15.0;        ///< shorter segments are left out [px]
   int max_segments = 1000;         ///< the longest are kept
 
   /** All faults, one a line; empty when the parameters are usable. */

@@ -22,11 +22,11 @@ enum class PairSelection
 /** Options of intensity profiles (thesis ch. 6). */
 struct ProfileParams
 {
-  PairSelection selection = PairSelection::NEAREST;
-  int neighbours = 50;        ///< K_c: pairs a corner starts (NEAREST)
+  PairSelection selection = PairSelection::NEAREST;  ///< which corners are paired
+  int neighbours = 50;        ///< K_c: with so many of its nearest corners each one is paired (NEAREST)
   double max_length = 200.0;  ///< D_c: longest profile (RADIUS) [px]
   double min_length = 10.0;   ///< shortest profile [px]
-  int coefficients = 8;       ///< N_f: 4, 6 or 8 Fourier features a profile
+  int coefficients = 8;       ///< N_f: number of Fourier features of a profile: 4, 6 or 8
   double min_contrast = 6.0;  ///< profiles that differ less than this from their mean are left out [grey levels]
 
   /** All faults, one a line; empty when the parameters are usable. */
@@ -49,11 +49,11 @@ struct ProfileSet
   struct Pair
   {
     int start;  ///< index of a corner
-    int end;
+    int end;    ///< index of another
   };
 
-  int coefficients = 0;  ///< features a profile
-  std::vector<Pair> pairs;
+  int coefficients = 0;         ///< number of features of a profile
+  std::vector<Pair> pairs;      ///< the ends of each profile
   std::vector<float> features;  ///< pairs.size() x coefficients, row-major
 
   const float* feature(std::size_t pair) const
@@ -79,8 +79,9 @@ constexpr float reversalSign(int feature_index)
 ProfileSet extractProfiles(const cv::Mat& image, const std::vector<Corner>& corners, const ProfileParams& params);
 
 /**
- * The raw features of one profile before normalisation over the image. Brightness is normalised as
- * (p - mean) / max|p - mean|; eq. 6.1 divides by max(p), which depends on an offset of the light.
+ * The raw features of one profile before normalisation over the image: `features` is an array of params.coefficients
+ * numbers that are set. `start` and `end` are pixels of `image`, which is 8-bit with one channel. Brightness is
+ * normalised as (p - mean) / max|p - mean|; eq. 6.1 divides by max(p), which depends on an offset of the light.
  * @return false when its contrast is below `min_contrast` or an end lies outside the image; `features` is then
  * untouched.
  */

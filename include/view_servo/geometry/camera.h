@@ -21,13 +21,13 @@ namespace view_servo
  */
 struct Camera
 {
-  int width = 0;  ///< of the calibrated image [px]
-  int height = 0;
-  std::string distortion_model;
-  std::vector<double> distortion;               ///< in the order of the model
+  int width = 0;                                ///< width of the images that the calibration is of [px]
+  int height = 0;                               ///< their height [px]
+  std::string distortion_model;                 ///< one of the models above
+  std::vector<double> distortion;               ///< coefficients, in the order of the model
   Eigen::Matrix3d k = Eigen::Matrix3d::Zero();  ///< intrinsics of the raw image [px]; zero = uncalibrated
   Eigen::Matrix3d rectification = Eigen::Matrix3d::Identity();  ///< raw frame -> rectified frame; zero = identity
-  /** Of the rectified image [px]; zero = that of `k`. */
+  /** Projection matrix of the rectified image [px]; all zeros: the rectified image has the intrinsics `k`. */
   Eigen::Matrix<double, 3, 4> projection = Eigen::Matrix<double, 3, 4>::Zero();
 
   bool calibrated() const
@@ -36,8 +36,8 @@ struct Camera
   }
 
   /**
-   * Why the camera cannot be used, naming the field of sensor_msgs/CameraInfo, in one line: it is not calibrated, a number
-   * is not finite, the coefficients do not fit the model, or the model is unknown. Empty when it can be used.
+   * Why the camera cannot be used, naming the field of sensor_msgs/CameraInfo, in one line: it is not calibrated, a
+   * number is not finite, the coefficients do not fit the model, or the model is unknown. Empty when it can be used.
    */
   std::string fault() const;
 
@@ -54,16 +54,16 @@ struct Camera
   }
 
   /**
-   * Pixel of the raw image -> point (x, y) on the plane z = 1 of the optical frame, distortion removed.
-   * NaN when the camera is not calibrated, where the distortion has no inverse, and for rays that do not meet that plane.
+   * Pixel of the raw image -> point (x, y) on the plane z = 1 of the optical frame, distortion removed. NaN when the
+   * camera is not calibrated, where the distortion has no inverse, and for rays that do not meet that plane.
    * @throws std::invalid_argument for a distortion that fault() names.
    */
   Eigen::Vector2d normalized(const Eigen::Vector2d& pixel) const;
   Points normalized(const Points& pixels) const;
 
   /**
-   * Point (x, y) on the plane z = 1 of the optical frame -> pixel of the raw image, distortion applied. NaN when the camera
-   * is not calibrated. @throws std::invalid_argument for a distortion that fault() names.
+   * Point (x, y) on the plane z = 1 of the optical frame -> pixel of the raw image, distortion applied. NaN when the
+   * camera is not calibrated. @throws std::invalid_argument for a distortion that fault() names.
    */
   Points distorted(const Points& points) const;
 

@@ -12,8 +12,8 @@ namespace view_servo
 {
 /**
  * Turns images of one camera into those that another would have taken at the same place: other focal length, size or
- * lens. The rectified frames of both count as the same. From a camera to its own rectified() this is rectification; from
- * a camera to itself nothing changes. Not for several threads at once.
+ * lens. The rectified frames of both count as the same. From a camera to its own rectified() this is rectification;
+ * from a camera to itself nothing changes. Not for several threads at once.
  */
 class CameraWarp
 {
@@ -37,7 +37,8 @@ public:
   }
 
   /**
-   * An image of `from` as `to` would have taken it; shares its data when not active(). What `from` did not see is black.
+   * An image of `from` as `to` would have taken it; shares its data when not active(). What `from` did not see is
+   * black.
    * @throws std::invalid_argument when it has another size than `from` has.
    */
   cv::Mat image(const cv::Mat& image) const;
@@ -46,8 +47,9 @@ public:
   Eigen::Vector2d point(const Eigen::Vector2d& pixel) const;
 
   /**
-   * A rectangle in images of `from` -> the one around what becomes of it, within the image and without what `from` did not
-   * see. An empty one stands for the whole image. The result is empty only when nothing is left, or when nothing changes.
+   * A rectangle in images of `from` -> the one around what becomes of it, within the image and without what `from` did
+   * not see. An empty one stands for the whole image. The result is empty only when nothing is left, or when nothing
+   * changes.
    */
   cv::Rect region(const cv::Rect& region) const;
 

@@ -9,10 +9,16 @@
 
 namespace view_servo
 {
-/** Positions in an image: u right, v down, in pixels, (0, 0) at the centre of the top-left pixel. */
+/**
+ * Positions in an image: u right, v down, (0, 0) at the centre of the top-left pixel. In pixels, unless a function
+ * says that it takes or gives points (x, y) on the plane z = 1 of a frame, such as level points.
+ */
 using Points = std::vector<Eigen::Vector2d>;
 
-/** The same physical point seen in the stored view (`reference`) and in the live image (`current`); pixels. */
+/**
+ * The same physical point seen in the stored view (`reference`) and in the live image (`current`). In pixels, unless a
+ * function says otherwise, as for Points.
+ */
 struct Correspondence
 {
   Eigen::Vector2d reference;

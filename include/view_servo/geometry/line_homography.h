@@ -42,8 +42,9 @@ std::optional<Eigen::Matrix3d> affinityFromLines(const SegmentPairs& pairs);
 /** How much a local affine map may distort; s1 >= s2 are the singular values of its linear part. */
 struct AffinityLimits
 {
-  double scale_change = 5.0;  ///< most that lengths grow or shrink, as the mean sqrt(s1 s2) of all directions, > 1
-  double anisotropy = 6.0;    ///< largest (s1² + s2²) / (s1 s2): about s1 / s2 when the two differ much, > 2
+  /** Largest factor by which lengths grow or shrink, on average over all directions: sqrt(s1 s2), > 1. */
+  double scale_change = 5.0;
+  double anisotropy = 6.0;  ///< largest (s1² + s2²) / (s1 s2): about s1 / s2 when the two differ much, > 2
 };
 
 /**

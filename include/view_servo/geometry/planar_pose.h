@@ -40,7 +40,7 @@ PlanarPose toPlanar(const Eigen::Isometry3d& pose);
 struct CameraMount
 {
   Eigen::Matrix3d level_from_camera = Eigen::Matrix3d::Identity();  ///< vectors: optical frame -> level frame
-  PlanarPose on_base;  ///< pose in base_link of the camera, its x axis along the optical axis
+  PlanarPose on_base;  ///< pose of the camera in base_link [m, rad]; its x axis is the optical axis, seen from above
 
   CameraMount() = default;
   /**

@@ -32,8 +32,8 @@ constexpr int MIN_IMAGE_SIDE = 16;
 cv::Mat toGrey(const cv::Mat& image, const std::string& name);
 
 /**
- * The bytes of a PNG, JPEG, PNM, BMP or TIFF file as 8-bit grey. Other formats are refused, as they cannot tell their size
- * before they are decoded. @param name what an error calls the image.
+ * The bytes of a PNG, JPEG, PNM, BMP or TIFF file as 8-bit grey. Other formats are refused, as they cannot tell their
+ * size before they are decoded. @param name what an error calls the image.
  * @throws ImageError when it is not such an image, is damaged, or has a size beyond the limits.
  */
 cv::Mat decodeGreyImage(const std::string& bytes, const std::string& name);
@@ -41,7 +41,10 @@ cv::Mat decodeGreyImage(const std::string& bytes, const std::string& name);
 /** The same of a file. @throws ImageError likewise, and when it is missing, not a regular file or not readable. */
 cv::Mat readGreyImage(const std::string& path);
 
-/** Why a grey image, 8 bits, can hardly show anything: "nearly black", "nearly white", "nearly the same everywhere"; or "". */
+/**
+ * Why a grey image, 8 bits, can hardly show anything: "nearly black", "nearly white", "nearly the same everywhere"; or
+ * "".
+ */
 std::string lackOfLight(const cv::Mat& grey);
 
 }  // namespace view_servo

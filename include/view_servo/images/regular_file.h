@@ -10,8 +10,9 @@
 namespace view_servo
 {
 /**
- * All bytes of a file; empty when there is none of that name. Pipes, devices and directories are refused and never waited
- * for. @param max_size larger files are refused [bytes]. @throws std::runtime_error saying why, without the file's name.
+ * All bytes of a file; empty when there is none of that name. Pipes, devices and directories are refused and never
+ * waited for. @param max_size larger files are refused [bytes]. @throws std::runtime_error saying why, without the
+ * file's name.
  */
 std::optional<std::string> readRegularFile(const std::filesystem::path& path, std::uintmax_t max_size);
 

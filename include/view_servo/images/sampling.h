@@ -33,7 +33,7 @@ public:
     return u >= Real(0) && v >= Real(0) && u < static_cast<Real>(last_u_) && v < static_cast<Real>(last_v_);
   }
 
-  /** The grey level at a place that the image contains(), which is not checked [0, 255]. */
+  /** The grey level, in [0, 255], at a place. The image has to contain() it, which is not checked. */
   float at(float u, float v) const
   {
     const int left = static_cast<int>(u);

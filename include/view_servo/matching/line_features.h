@@ -22,9 +22,9 @@ namespace view_servo
 struct LineFeatureParams
 {
   LineGroupParams groups;
-  int max_grouped = 400;     ///< this many of the longest segments form groups and seeds; regions grow over all
-  int neighbours = 40;       ///< nearest segments of each, by which a hypothesis is judged
-  int neighbour_pairs = 15;  ///< nearest segments of each that form a hypothesis with it
+  int max_grouped = 400;     ///< only so many segments, the longest, form groups and start regions
+  int neighbours = 40;       ///< number of nearest segments kept for each, by which a hypothesis is judged
+  int neighbour_pairs = 15;  ///< at most so many of these, whose lines meet its line, form hypotheses with it
 
   /** All faults, one a line; empty when the parameters are usable. */
   std::vector<std::string> validate() const;
@@ -46,11 +46,11 @@ public:
   /** A segment whose line meets that of another. */
   struct Meeting
   {
-    int other;
+    int other;           ///< index of the other segment
     Eigen::Vector2d at;  ///< intersection of the two lines [px]
   };
 
-  static constexpr double MIN_ANGLE = 0.2;  ///< between lines that meet [rad]
+  static constexpr double MIN_ANGLE = 0.2;  ///< least angle between lines that count as meeting [rad]
 
   /**
    * @param grey 8-bit, one channel.
@@ -113,10 +113,10 @@ private:
   /** Segments of about one direction, ordered across it. */
   struct DirectionBin
   {
-    Eigen::Vector2d across;         ///< unit vector
-    std::vector<int> segments;      ///< by their least offset across
-    std::vector<double> low;        ///< of each that offset [px]
-    std::vector<double> high_here;  ///< largest offset of all segments up to each [px]
+    Eigen::Vector2d across;         ///< unit vector at a right angle to the direction; offsets are positions along it
+    std::vector<int> segments;      ///< indices, in ascending order of the smaller offset of the segment's two ends
+    std::vector<double> low;        ///< that smaller offset of each segment in `segments` [px]
+    std::vector<double> high_here;  ///< largest offset of any end of this segment or one before it [px]
   };
 
   static int directionBin(const Eigen::Vector2d& direction);

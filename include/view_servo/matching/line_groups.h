@@ -38,12 +38,12 @@ enum class LineOrder
 /** Options of forming groups. */
 struct LineGroupParams
 {
-  LineGrouping groups = LineGrouping::TRIPLETS;
-  LineOrder order = LineOrder::CONTRAST;
-  double max_distance = 100.0;  ///< from each segment of a pair to the intersection of their lines [px]
+  LineGrouping groups = LineGrouping::TRIPLETS;  ///< how many segments a group has
+  LineOrder order = LineOrder::CONTRAST;         ///< how the ends of a segment are told apart
+  double max_distance = 100.0;  ///< of each segment of a pair from the intersection of their lines [px]
   double collinearity = 2.0;    ///< a point this close to a segment's line counts as on it [px]
-  double min_angle_deg = 15.0;  ///< between the lines of a pair
-  int max_neighbours = 15;      ///< pairs that a segment forms, the closest; 0 = no limit
+  double min_angle_deg = 15.0;  ///< least angle between the lines of the two segments of a pair [deg]
+  int max_neighbours = 15;      ///< most pairs that a segment forms, the closest ones; 0 = no limit
   double min_weight = 0.1;      ///< structures less likely than this are left out
 
   /** All faults, one a line; empty when the parameters are usable. */
@@ -69,8 +69,8 @@ std::optional<Eigen::Vector2d> lineIntersection(const Segment& a, const Segment&
 /** One of the structures that a pair may have had before its segments were broken up, and how likely it is. */
 struct PairHypothesis
 {
-  int index;
-  double weight;
+  int index;      ///< as pairIndex() gives it
+  double weight;  ///< probability of this structure, [0, 1]
 };
 
 /**
@@ -86,8 +86,8 @@ std::array<PairHypothesis, 4> pairHypotheses(const Segment& a, const Segment& b,
 struct LineGroup
 {
   std::uint32_t key;            ///< equal keys: same structure; see tripletKey()
-  float weight;                 ///< of the structure, (0, 1]
-  std::array<int, 3> segments;  ///< indices, in the order that corresponds between views
+  float weight;                 ///< probability of the structure, (0, 1]
+  std::array<int, 3> segments;  ///< indices of its segments: those in one place correspond between two groups
 };
 
 /**

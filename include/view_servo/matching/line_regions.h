@@ -28,8 +28,8 @@ struct LineRegionParams
   int max_hypotheses = 3;             ///< affine maps scored for a candidate, those whose three segments agree best
   double affine_tolerance = 3.0;      ///< distance across of segments that agree with a local affine map [px]
   double tolerance = 2.0;             ///< distance across of segments that agree with a homography [px]
-  double max_angle_deg = 10.0;        ///< between a segment and its counterpart
-  double min_support = 5.0;           ///< of a region: sum over its matches of 0.3 + 0.7 share
+  double max_angle_deg = 10.0;        ///< largest angle between a mapped segment and its counterpart [deg]
+  double min_support = 5.0;           ///< least sum over a region's matches of 0.3 + 0.7 share
   double min_correlation = 0.55;      ///< least sideCorrelation() of a match
   double min_mean_correlation = 0.6;  ///< least mean of a region's matches
 
@@ -43,8 +43,8 @@ std::vector<Parameter> parameters(LineRegionParams& params);
 /** A segment and its counterpart, by their indices. */
 struct SegmentMatch
 {
-  int reference;
-  int current;
+  int reference;             ///< index of the segment in the reference image
+  int current;               ///< index of the segment in the current image
   double share;              ///< length side by side over the length that both cover, in the current image, (0, 1]
   double correlation = 0.0;  ///< sideCorrelation(), [-1, 1]
 };
@@ -52,7 +52,7 @@ struct SegmentMatch
 /** Matches of neighbouring segments that agree with one homography. */
 struct LineRegion
 {
-  Eigen::Matrix3d h;  ///< reference -> current
+  Eigen::Matrix3d h;  ///< homography x_cur ~ H x_ref [px]
   std::vector<SegmentMatch> matches;
   double support;  ///< sum over the matches of (0.3 + 0.7 share) x correlation
 };

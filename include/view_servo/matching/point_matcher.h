@@ -30,9 +30,9 @@ struct PointMatcherParams
   ProfileSearchParams search;
   AssignmentMethod assignment = AssignmentMethod::EXACT;
   bool cyclic_order = true;      ///< weigh associations by cyclic alignment of the profiles that voted (ch. 7)
-  double min_correlation = 0.7;  ///< profiles that correlate less are not aligned (7.3)
-  int cyclic_entries =
-      5;  ///< entries that are aligned: so many of each row and of each column, those of most votes; 0 = all
+  double min_correlation = 0.7;  ///< least correlation of profiles that are aligned (7.3)
+  /** Entries that are aligned: so many of each row and of each column, those of most votes; 0 = all. */
+  int cyclic_entries = 5;
 
   /** All faults, one a line; empty when the parameters are usable. */
   std::vector<std::string> validate() const;

@@ -21,10 +21,10 @@ enum class ProfileSearch
 struct ProfileSearchParams
 {
   ProfileSearch search = ProfileSearch::NEAREST;
-  int neighbours = 12;   ///< K_v (NEAREST): profiles each votes for; the thesis' 25 find 2 % more in 1.6 times the time
+  int neighbours = 12;   ///< K_v (NEAREST): number of profiles each votes for; 25 find 2 % more, in 1.6 times the time
   double radius = 0.5;   ///< D_v (RADIUS): distance of similar profiles [standard deviations of a feature]
-  double epsilon = 3.0;  ///< a missed neighbour is at most (1 + epsilon) times nearer than those found (NEAREST)
-  double share = 1.0;    ///< part of the current profiles that are searched for: those of the largest features
+  double epsilon = 3.0;  ///< a neighbour found is at most (1 + epsilon) times farther than the true one (NEAREST)
+  double share = 1.0;    ///< part of the current profiles that vote: those whose feature vectors are longest
 
   /** All faults, one a line; empty when the parameters are usable. */
   std::vector<std::string> validate() const;
@@ -36,7 +36,7 @@ std::vector<Parameter> parameters(ProfileSearchParams& params);
 /** A reference profile found similar to a current one. */
 struct ProfileMatch
 {
-  int reference;  ///< pair in the reference's ProfileSet
+  int reference;  ///< index into the reference's ProfileSet::pairs
   bool reversed;  ///< the reference profile, read from end to start, is similar to the current one from start to end
 };
 

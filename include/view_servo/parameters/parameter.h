@@ -13,8 +13,8 @@
 namespace view_servo
 {
 /**
- * A parameter, stated once: a table of these is what yaml files, the parameter server and `--set name=value` are read by,
- * what values are checked by, and what docs/parameters.md and the files in config/ are compared with.
+ * A parameter, stated once: a table of these is what yaml files, the parameter server and `--set name=value` are read
+ * by, what values are checked by, and what docs/parameters.md and the files in config/ are compared with.
  */
 struct Parameter
 {
@@ -26,9 +26,12 @@ struct Parameter
    * parameter of the same table, ">= gain". Empty: all finite ones.
    */
   std::string range;
-  std::string description;
-  std::function<std::string()> get;
-  /** Parses and stores; returns false, and stores nothing, when the text is not of the type. Ranges are faultsOf()'s to check. */
+  std::string description;           ///< one line, for people
+  std::function<std::string()> get;  ///< the value as text
+  /**
+   * Parses and stores; returns false, and stores nothing, when the text is not of the type. Ranges are faultsOf()'s to
+   * check.
+   */
   std::function<bool(const std::string&)> set;
   std::function<double()> number;  ///< the value of an "int" or a "double"; empty for other types
 };
@@ -91,8 +94,8 @@ void setParameter(const std::vector<Parameter>& table, const std::string& name, 
 std::vector<Parameter> joined(std::initializer_list<std::vector<Parameter>> tables);
 
 /**
- * What is wrong with the values, one text for each: numbers that are not finite or out of their range, and choices that are
- * none of the words.
+ * What is wrong with the values, one text for each: numbers that are not finite or out of their range, and choices
+ * that are none of the words.
  * @throws std::logic_error when a range cannot be read.
  */
 std::vector<std::string> faultsOf(const std::vector<Parameter>& table);

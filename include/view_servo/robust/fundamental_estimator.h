@@ -41,10 +41,11 @@ private:
 };
 
 /**
- * The last fit to pairs that agree with a fundamental matrix within a few pixels. Some of these may be wrong, and where the
- * right ones hold the matrix weakly, as before two planes, even one of them can tilt it while all stay within a threshold.
- * So fits to parts of the pairs, drawn at random, compete by how near most pairs come to them, at several scales at once (as
- * in MAGSAC, Barath et al. 2019), and the best is refined over the pairs within three standard deviations, by the median.
+ * The last fit to pairs that agree with a fundamental matrix within a few pixels. Some of these may be wrong, and
+ * where the right ones hold the matrix weakly, as before two planes, even one of them can tilt it while all stay
+ * within a threshold. So fits to parts of the pairs, drawn at random, compete by how near most pairs come to them, at
+ * several scales at once (as in MAGSAC, Barath et al. 2019), and the best is refined over the pairs within three
+ * standard deviations, by the median.
  * @param huber_width distances beyond count linearly [px]. @return `matrix` when nothing is better.
  */
 Eigen::Matrix3d polishFundamental(const Eigen::Matrix3d& matrix, const Correspondences& pairs, double huber_width);

@@ -22,8 +22,8 @@ namespace view_servo
 struct LinePlaneParams
 {
   double threshold = 2.0;  ///< largest distance of a plane's lines, across, in either image [px]
-  int min_lines = 8;       ///< lines that make a plane
-  int max_planes = 4;      ///< planes looked for
+  int min_lines = 8;       ///< least number of lines that make a plane
+  int max_planes = 4;      ///< at most so many planes are looked for
 
   /** All faults, one a line; empty when the parameters are usable. */
   std::vector<std::string> validate() const;

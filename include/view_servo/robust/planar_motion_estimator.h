@@ -13,10 +13,10 @@ namespace view_servo
 /** A motion on the floor, with the matrices by which every datum is scored. */
 struct PlanarMotion
 {
-  PlanarPose pose;           ///< of the reference camera in the current one, of distance 1
-  Eigen::Matrix3d rotation;  ///< X_cur = R X_ref + t
-  Eigen::Vector3d translation;
-  Eigen::Matrix3d essential;  ///< x_curᵀ E x_ref = 0
+  PlanarPose pose;              ///< of the reference camera in the current one, of distance 1
+  Eigen::Matrix3d rotation;     ///< X_cur = R X_ref + t
+  Eigen::Vector3d translation;  ///< t of the same equation, of length 1
+  Eigen::Matrix3d essential;    ///< x_curᵀ E x_ref = 0
 
   explicit PlanarMotion(const PlanarPose& reference_in_current)
     : pose(reference_in_current),

@@ -18,12 +18,12 @@ struct RansacParams
 {
   double inlier_threshold = 3.0;   ///< largest error of an inlier [px]
   double confidence = 0.999;       ///< wanted probability that an outlier-free sample was drawn
-  int min_iterations = 100;        ///< samples solved before the adaptive stop (thesis eq. 9.5) may end it
+  int min_iterations = 100;        ///< samples solved before the adaptive stop (thesis eq. 9.5) may end the search
   int max_iterations = 2000;       ///< random samples solved at most
-  int max_rejected = 50000;        ///< samples the estimator's cheap test may refuse in all (one more ends it)
+  int max_rejected = 50000;        ///< samples that Estimator::accepts() may refuse in all; one more ends the search
   int local_optimizations = 10;    ///< refits to the inliers of a new best model (Chum, Matas & Kittler 2003), 0 = off
   bool improvement_stage = false;  ///< thesis 9.4: replace each datum of the best sample by others in turn
-  Sampling sampling = Sampling::PROGRESSIVE;
+  Sampling sampling = Sampling::PROGRESSIVE;  ///< how samples are drawn from the data
 
   /** All faults, one a line; empty when the parameters are usable. */
   std::vector<std::string> validate() const;
@@ -42,12 +42,12 @@ enum class RansacStop
 
 struct RansacStatistics
 {
-  int iterations = 0;           ///< random samples solved (those of the improvement stage come on top)
-  int rejected_samples = 0;     ///< samples refused by the estimator before solving
-  int models = 0;               ///< models scored
-  int local_optimizations = 0;  ///< refits that improved the best model
-  RansacStop stop = RansacStop::TOO_FEW_DATA;
-  double elapsed_ms = 0.0;
+  int iterations = 0;                          ///< random samples solved (those of the improvement stage come on top)
+  int rejected_samples = 0;                    ///< samples refused by the estimator before solving
+  int models = 0;                              ///< models scored
+  int local_optimizations = 0;                 ///< refits that improved the best model
+  RansacStop stop = RansacStop::TOO_FEW_DATA;  ///< why the search ended
+  double elapsed_ms = 0.0;                     ///< [ms]
 };
 
 template <typename Model>
@@ -55,7 +55,8 @@ struct RansacResult
 {
   std::optional<Model> model;  ///< empty: no sample gave a model
   std::vector<int> inliers;    ///< indices of the data within the threshold, ascending
-  double cost = 0.0;           ///< of the consensus; MSAC: sum over all data of min(error², threshold²) [px²]
+  /** Of the model, by the Consensus; with MSAC the sum over all data of min(error(), threshold²) [px²]. */
+  double cost = 0.0;
   RansacStatistics statistics;
 };
 

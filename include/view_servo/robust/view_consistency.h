@@ -22,7 +22,7 @@ double viewConstraint(const std::array<Correspondence, 5>& five);
 struct ViewConsistencyParams
 {
   double threshold = 0.03;         ///< a group of five is consistent below this violation
-  double mean_increments = 100.0;  ///< stop when the candidates were counted this often on average
+  double mean_increments = 100.0;  ///< groups are drawn until the candidates were counted this often on average
   int max_groups = 200000;         ///< groups drawn at most
 
   /** All faults, one a line; empty when the parameters are usable. */

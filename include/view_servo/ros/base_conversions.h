@@ -29,7 +29,10 @@ PlanarPose toPlanarPose(const nav_msgs::Odometry& message);
 geometry_msgs::TwistStamped toTwistStamped(const BaseVelocity& velocity, const ros::Time& stamp,
                                            const std::string& base_frame);
 
-/** Matches in pixels, weighted by their scores; those with a score that is negative or NaN are left out. */
+/**
+ * Matches as pixels of the raw images, not as level points, weighted by their scores. Those whose score is negative or
+ * not finite are left out.
+ */
 HeadingEvidence toHeadingEvidence(const std::vector<PointMatch>& matches);
 
 Heading toHeading(const HomingReport& report, const std::string& base_frame);

@@ -28,11 +28,12 @@ struct CameraFrame
   sensor_msgs::CameraInfoConstPtr info;
 };
 
+/** Options of a node's camera. */
 struct CameraInputParams
 {
-  std::string image_transport = "raw";  // read by image_transport itself
-  int queue_size = 5;
-  double max_image_age = 1.0;  // [s]
+  std::string image_transport = "raw";  ///< how images travel; image_transport itself reads the parameter
+  int queue_size = 5;          ///< images that wait for the camera_info with their stamp, and the other way round
+  double max_image_age = 1.0;  ///< an older image is not what the camera sees now [s]
 };
 
 /** Names, units, ranges and meanings of these parameters. */
@@ -108,11 +109,11 @@ private:
   std::string fault_;    // of the last pair
   std::string problem_;  // why the last frame was not usable, or none came
   int unpaired_ = 0;     // images since the last camera_info
-  int images_ = 0;       // since the last check
-  int infos_ = 0;
-  int pairs_ = 0;
-  double rate_ = 0.0;  // of usable frames [Hz]
-  int frames_ = 0;     // usable, since the last diagnosis
+  int images_ = 0;       // images that have come since the last check
+  int infos_ = 0;        // messages on camera_info that have come since the last check
+  int pairs_ = 0;        // images and camera_info with one stamp, since the last check
+  double rate_ = 0.0;    // of usable frames [Hz]
+  int frames_ = 0;       // usable, since the last diagnosis
   ros::WallTime last_diagnosis_;
 
   image_transport::ImageTransport transport_;

@@ -60,8 +60,8 @@ public:
     UNUSABLE  ///< zero, too old, far in the future, the same as before, or far behind: reject() was called
   };
   /**
-   * Checks the stamp of what has come. When time has gone back, as when a bag loops, jump() says so afterwards and the stamp
-   * is the newest.
+   * Checks the stamp of what has come. When time has gone back, as when a bag loops, jump() says so afterwards and the
+   * stamp is the newest.
    */
   Stamp checkStamp(const ros::Time& stamp);
   /** Says by how much time has gone back with the stamp checked last; empty when it has not. */
@@ -95,6 +95,7 @@ public:
   /** What is missing, in one line; empty: nothing. */
   std::string missing() const;
 
+  /** Time since something that can be used came, or since the goal began [s]. */
   double age() const
   {
     return watch_.age();
@@ -125,7 +126,10 @@ private:
   bool needed_ = true;
 };
 
-/** Says how far the newest stamps of odometry and images are apart when this is too far to use them together; else empty. */
+/**
+ * Says how far the newest stamps of odometry and images are apart when this is too far to use them together; else
+ * empty.
+ */
 std::string stampsApart(const DriverInput& odometry, const DriverInput& images);
 
 /**
@@ -162,8 +166,8 @@ public:
   }
 
   /**
-   * Subscribes. @param handler is called with a const Message::ConstPtr&, by runLocked(). @return the subscriber, which the
-   * node keeps.
+   * Subscribes. @param handler is called with a const Message::ConstPtr&, by runLocked(). @return the subscriber,
+   * which the node keeps.
    */
   template <typename Message, typename Handler>
   ros::Subscriber listen(const std::string& topic, std::uint32_t queue_size, Handler handler)
@@ -236,8 +240,8 @@ protected:
 
   CommandGate gate_;
   mutable std::mutex mutex_;
-  double start_patience_ = START_PATIENCE;
-  std::string waiting_for_;  ///< what a goal that is prepared waits for
+  double start_patience_ = START_PATIENCE;  ///< longest wait of waitFor() [s]
+  std::string waiting_for_;                 ///< what a goal that is prepared waits for
   std::vector<std::unique_ptr<DriverInput>> inputs_;
   std::vector<ros::Subscriber> subscribers_;
 

@@ -20,7 +20,7 @@ struct DriverParams
 {
   bool dry_run = false;                    ///< publishes commands on cmd_vel_dry, not on cmd_vel
   double timeout = 60.0;                   ///< a goal that asks for none ends after this time [s]
-  double control_rate = 50.0;              ///< of commands [Hz]
+  double control_rate = 50.0;              ///< how often commands are sent [Hz]
   double start_patience = START_PATIENCE;  ///< how long a goal waits for what it needs before it drives [s]
 };
 
@@ -32,10 +32,13 @@ struct HomingDriverParams
 {
   DriverParams node;
   CameraInputParams camera;
-  std::filesystem::path views_dir;
-  std::string
-      view;  ///< whose direction is estimated while there is no goal, and which a goal without a name means; empty: none
-  std::string base_frame = "base_link";  ///< in which cmd_vel is
+  std::filesystem::path views_dir;  ///< directory of the stored views; empty: as viewsDir() says
+  /**
+   * Stored view whose direction is estimated while there is no goal, and which a goal without a name means; empty:
+   * none.
+   */
+  std::string view;
+  std::string base_frame = "base_link";  ///< the base's frame, in which commands are
   double image_timeout = 0.25;           ///< the base stands when no image has come for so long [s]
   double odometry_timeout = 0.25;        ///< the base stands when no odometry has come for so long [s]
   double odometry_delay = 0.0;           ///< odometry's stamps are later than images' of the same moment by this [s]
@@ -63,7 +66,7 @@ std::vector<Parameter> parameters(HomingDriverParams& params);
 struct ServoDriverParams
 {
   DriverParams node;
-  std::filesystem::path views_dir;
+  std::filesystem::path views_dir;   ///< directory of the stored views; empty: as viewsDir() says
   double acquire_timeout = 15.0;     ///< a goal ends when the view has not been found after this time [s]
   double homography_timeout = 0.25;  ///< the arm stands when no homography has come for so long [s]
   double max_homography_age = 0.5;   ///< homographies of older images are not used [s]

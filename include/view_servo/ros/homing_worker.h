@@ -23,7 +23,7 @@ namespace view_servo
 /** Homing to a view: for a goal, or without one, to estimate the view's direction only. */
 struct HomingTask
 {
-  std::string view;
+  std::string view;                      ///< name of the stored view
   sensor_msgs::CameraInfoConstPtr info;  ///< calibration that `homing` was made with
   std::unique_ptr<Homing> homing;        ///< only the worker's thread uses it
 };
@@ -31,9 +31,9 @@ struct HomingTask
 /** The result of the images and matches that the worker took together. */
 struct HomingOutcome
 {
-  std::shared_ptr<HomingTask> task;
-  HomingReport report;
-  Course course;
+  std::shared_ptr<HomingTask> task;                                 ///< the task that the inputs were for
+  HomingReport report;                                              ///< what is known after them
+  Course course;                                                    ///< where to go after them
   std::optional<std::chrono::steady_clock::time_point> frame_time;  ///< when the image came; empty: none
   std::string fault;  ///< why the inputs could not be used; empty: they could
 };

@@ -35,11 +35,11 @@ SourceKind kindOf(const ImageSource& source, const std::string& name);
 /** An image with what its source says about it. */
 struct SourcedImage
 {
-  cv::Mat grey;
-  cv::Rect region;  ///< empty = the whole image
-  std_msgs::Header header;
-  std::optional<Camera> camera;
-  std::optional<ViewPose> pose;
+  cv::Mat grey;                  ///< 8-bit, one channel
+  cv::Rect region;               ///< region of interest [px]; empty = the whole image
+  std_msgs::Header header;       ///< stamp and camera's frame; empty for a file
+  std::optional<Camera> camera;  ///< its calibration; empty where the source has none
+  std::optional<ViewPose> pose;  ///< of the camera, for a stored view that has one
 };
 
 /** The parameter `~views_dir`: where stored views are. */
@@ -54,11 +54,12 @@ std::vector<std::string> viewFaults(const std::string& view);
 /** The directory that an empty `~views_dir` stands for, or the one given. */
 std::filesystem::path viewsDir(const std::filesystem::path& views_dir);
 
+/** Options of ImageSourceReader. */
 struct ImageSourceParams
 {
-  std::filesystem::path views_dir;
-  bool allow_paths = true;
-  double image_patience = 5.0;  // [s]
+  std::filesystem::path views_dir;  ///< where stored views are; empty: as viewsDir() says
+  bool allow_paths = true;          ///< whether requests may name files
+  double image_patience = 5.0;      ///< longest wait for an image of the camera when none has come yet [s]
 };
 
 /** Names, units, ranges and meanings of these parameters. */

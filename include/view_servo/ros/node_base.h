@@ -37,8 +37,8 @@ double secondsBetween(const ros::Time& from, const ros::Time& to);
 double ageOf(const ros::Time& stamp);
 
 /**
- * The order of the stamps of one input. A message may overtake another one, and is late then; but when one after the other
- * is far behind, time itself has gone back, as when a bag loops or a simulation begins anew.
+ * The order of the stamps of one input. A message may overtake another one, and is late then; but when one after the
+ * other is far behind, time itself has gone back, as when a bag loops or a simulation begins anew.
  */
 class StampOrder
 {

@@ -18,7 +18,7 @@ struct ViewStoreNodeParams
 {
   CameraInputParams camera;
   ImageSourceParams sources;
-  std::string fixed_frame = "odom";
+  std::string fixed_frame = "odom";  ///< frame in which the camera's pose is stored with a view; empty: never
 
   /** All faults, one a line; empty when the parameters are usable. */
   std::vector<std::string> validate() const;
@@ -32,9 +32,9 @@ struct HomographyTrackerNodeParams
 {
   CameraInputParams camera;
   SessionStarterParams sessions;
-  std::string view;
-  double match_period = 0.3;        // [s]
-  PointViewMatcherParams matching;  // in the sub-namespace `matching`, read and validated by themselves
+  std::string view;                 ///< stored view that is followed from the start; empty: none
+  double match_period = 0.3;        ///< time from one search for the view to the next [s]
+  PointViewMatcherParams matching;  ///< in the sub-namespace `matching`; read and checked by themselves
 
   /** All faults, one a line; empty when the parameters are usable. */
   std::vector<std::string> validate() const;

@@ -21,9 +21,9 @@ namespace view_servo
 /** Odometry that can be used. */
 struct OdometryReading
 {
-  DriverInput::Stamp place;
-  double time;      ///< of the images' clock, as far as `~odometry_delay` is right [s]
-  PlanarPose pose;  ///< of `~base_frame` in odometry's frame
+  DriverInput::Stamp place;  ///< NEWEST or LATE
+  double time;               ///< when the base was there, by the images' clock if `~odometry_delay` is right [s]
+  PlanarPose pose;           ///< of `~base_frame` in odometry's frame
 };
 
 /**

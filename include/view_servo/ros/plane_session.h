@@ -25,15 +25,15 @@ namespace view_servo
 {
 /**
  * Follows the plane of a stored view through the images of one camera, with one calibration. The view is searched for
- * in images as they come (PlaneFinder) and tracked in rectified ones (PlaneTracker). A view of another camera is tracked
- * as this one would have taken it. Not for several threads at once.
+ * in images as they come (PlaneFinder) and tracked in rectified ones (PlaneTracker). A view of another camera is
+ * tracked as this one would have taken it. Not for several threads at once.
  */
 class PlaneSession
 {
 public:
   /**
-   * @throws std::runtime_error when the view's camera cannot be used (see cameraOf()) or this camera would show nothing of
-   * the view's region, and what CameraWarp and PlaneTracker throw.
+   * @throws std::runtime_error when the view's camera cannot be used (see cameraOf()) or this camera would show
+   * nothing of the view's region, and what CameraWarp and PlaneTracker throw.
    */
   PlaneSession(const CachedView& view, const sensor_msgs::CameraInfo& info, const PlaneTrackerParams& params);
 
@@ -43,13 +43,19 @@ public:
   /** To be called before each image. When time has gone back, all that was found is forgotten. */
   StampOrder::Place checkTime(const ros::Time& stamp);
 
-  /** The question to PlaneFinder of where the view is in an image. @param raw as it came. */
+  /**
+   * The question to PlaneFinder of where the view is in an image.
+   * @param raw the image as the camera took it, with distortion; 8-bit, one channel.
+   */
   PlaneFinder::Question question(const cv::Mat& raw) const;
 
   /** Starts tracking from where PlaneFinder found the view. @param camera_in_odom when that image was taken. */
   void start(const PlaneFinder::Answer& answer, const std::optional<Eigen::Isometry3d>& camera_in_odom);
 
-  /** Tracks the plane in the next image. @param raw as it came. @param camera_in_odom as in PlaneTracker::add(). */
+  /**
+   * Tracks the plane in the next image.
+   * @param raw as in question(). @param camera_in_odom as in PlaneTracker::add().
+   */
   const PlaneTrack& add(const cv::Mat& raw, const std::optional<Eigen::Isometry3d>& camera_in_odom);
 
   /** Draws what was found in the last image, with a text below. */

@@ -22,11 +22,12 @@
 
 namespace view_servo
 {
+/** Options of SessionStarter, explained there. */
 struct SessionStarterParams
 {
-  std::filesystem::path views_dir;
-  std::string odom_frame = "base_link";
-  double tf_patience = 0.05;  // [s]
+  std::filesystem::path views_dir;       ///< where stored views are; empty: as viewsDir() says
+  std::string odom_frame = "base_link";  ///< frame that does not jump; empty: none
+  double tf_patience = 0.05;             ///< longest wait of an image for tf [s]
   PlaneTrackerParams tracker;
 };
 
@@ -40,7 +41,7 @@ std::vector<Parameter> parameters(SessionStarterParams& params);
  *  - `~odom_frame` (string, default "base_link"): frame that does not jump, in which tf knows the camera's frame; "":
  *    none;
  *  - `~tf_patience` (double, default 0.05 [s], >= 0): longest wait of an image for tf;
- *  - those of tracking, see planeTrackerParameters().
+ *  - those of tracking, see PlaneTrackerParams.
  */
 class SessionStarter
 {

@@ -45,8 +45,8 @@ struct StreamingMatcherParams
 {
   CameraInputParams camera;
   ImageSourceParams sources;
-  std::string view;
-  double rate = 5.0;  // [Hz]
+  std::string view;   ///< stored view that camera images are matched with; empty: none
+  double rate = 5.0;  ///< camera images are matched at most this often [Hz]
 
   /** All faults, one a line; empty when the parameters are usable. */
   std::vector<std::string> validate() const;
@@ -58,9 +58,9 @@ std::vector<Parameter> parameters(StreamingMatcherParams& params);
 /** What a message about a view says besides the match. */
 struct MatchLabel
 {
-  std_msgs::Header header;
-  ChosenView chosen;
-  bool refused = false;  ///< the view cannot be matched whatever the camera sees
+  std_msgs::Header header;  ///< of the camera image
+  ChosenView chosen;        ///< which view the message is about, and for which goal
+  bool refused = false;     ///< the view cannot be matched whatever the camera sees
 };
 
 /**

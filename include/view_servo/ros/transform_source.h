@@ -16,8 +16,8 @@ namespace view_servo
 std::string withoutSlash(const std::string& frame);
 
 /**
- * Looks transforms up in tf. Frames may have a slash before their names. Waits are by a steady clock; tf2's own timeouts are on the clock of ROS, and do not end
- * while that stands still. Safe to use from several threads.
+ * Looks transforms up in tf. Frames may have a slash before their names. Waits are by a steady clock; tf2's own
+ * timeouts are on the clock of ROS, and do not end while that stands still. Safe to use from several threads.
  */
 class TransformSource
 {

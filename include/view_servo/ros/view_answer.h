@@ -21,7 +21,7 @@ public:
   {
   }
 
-  /** Another view is wanted from now on; empty: none. */
+  /** Another view is wanted from now on; empty: none. @param goal id of the goal that it is wanted for. */
   void want(const std::string& view, const std::string& goal);
 
   /** To be called with each message. @return whether it is about the wanted view and does not refuse it. */

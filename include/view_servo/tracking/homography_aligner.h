@@ -16,13 +16,13 @@
 
 namespace view_servo
 {
-/** Options of the homography aligner. */
+/** Options of HomographyAligner. */
 struct HomographyAlignerParams
 {
   int max_points = 200;          ///< corners of the stored view that are looked for
   int patch_radius = 10;         ///< patches of (2 r + 1)² pixels are compared; on coarse levels smaller ones
-  int levels = 4;                ///< of the pyramids, the image included; more of them catch faster motion
-  double min_correlation = 0.7;  ///< least one of a patch that is found again
+  int levels = 4;                ///< number of levels of the pyramids, the image included; more catch faster motion
+  double min_correlation = 0.7;  ///< least correlation of a patch that counts as found again
   double max_residual = 2.0;  ///< largest distance between where a supporting point is found and where H sends it [px]
   int min_supporting = 15;    ///< least number of points that support a homography
   double min_support = 0.25;  ///< least part of the points in sight that has to support the homography
@@ -43,7 +43,7 @@ struct TrackedHomography
   int looked_for = 0;                                     ///< points predicted to be in the image
   int supporting = 0;                                     ///< of these, found where the homography sends them
   Points points;                                          ///< the supporting ones, in the stored view [px]
-  double rms = std::numeric_limits<double>::quiet_NaN();  ///< of the supporting points [px]
+  double rms = std::numeric_limits<double>::quiet_NaN();  ///< root mean square of the supporting points' residuals [px]
 };
 
 /**

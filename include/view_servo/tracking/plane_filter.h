@@ -19,9 +19,17 @@ namespace view_servo
 /** Options of the filter of planes and motions. */
 struct PlaneFilterParams
 {
-  double window = 0.1;        ///< distance that averaged camera positions may span, and that d needs [m]
-  int max_measurements = 60;  ///< most that are averaged
-  double decision = 4.0;      ///< times that a decomposition's normals scatter more than the other's to be dropped
+  /**
+   * How far the camera may be from where it is now at measurements that are averaged, and how far apart two
+   * measurements have to be for d to be known [m].
+   */
+  double window = 0.1;
+  int max_measurements = 60;  ///< largest number of measurements that are averaged
+  /**
+   * A decomposition is dropped when its normals' mean squared angle from their mean is this many times that of the
+   * other.
+   */
+  double decision = 4.0;
 
   /** All faults, one a line; empty when the parameters are usable. */
   std::vector<std::string> validate() const;
@@ -33,7 +41,7 @@ std::vector<Parameter> parameters(PlaneFilterParams& params);
 /** What the filter knows after a measurement. */
 struct PlaneEstimate
 {
-  EuclideanHomography motion;      ///< X_cur = R X_ref + t of the last camera, averaged
+  EuclideanHomography motion;      ///< to the last camera: X_cur = R X_ref + t, t over d; averaged
   bool normal_known = false;       ///< if not, the plane is assumed to face the reference camera
   bool ambiguous = false;          ///< another decomposition is as likely
   std::optional<double> distance;  ///< d, of the plane from the reference camera [m]; empty until it is known

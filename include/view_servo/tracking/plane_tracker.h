@@ -59,7 +59,8 @@ class PlaneTracker
 {
 public:
   /**
-   * @param k camera matrix of the stored view and of all images, without distortion [px].
+   * @param reference the stored view, without distortion; 8-bit, one channel. @param region of it that shows the plane
+   * [px]; empty = everywhere. @param k camera matrix of the stored view and of all images, without distortion [px].
    * @throws what HomographyAligner throws, std::invalid_argument with all faults of the parameters.
    */
   PlaneTracker(const cv::Mat& reference, const cv::Rect& region, const Eigen::Matrix3d& k,
@@ -68,7 +69,7 @@ public:
   /**
    * Sets where the plane was found by other means. While the plane is tracked nothing changes, as tracking is more
    * accurate.
-   * @param h x_cur ~ H x_ref [px]. @param camera_in_odom of that image.
+   * @param h x_cur ~ H x_ref [px]. @param camera_in_odom as in add(), of the image in which the plane was found.
    */
   void start(const Eigen::Matrix3d& h, const std::optional<Eigen::Isometry3d>& camera_in_odom);
 

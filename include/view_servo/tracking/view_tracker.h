@@ -21,13 +21,14 @@ struct ViewTrackerParams
 {
   int max_landmarks = 200;  ///< points of the stored view that are tracked
   int window = 21;          ///< side of the patches [px]
-  int levels = 2;           ///< of the pyramid besides the image
-  double max_residual =
-      2.0;  ///< largest distance between where a supporting point is found and where the pose sends it [px]
-  int min_supporting = 15;             ///< least number of points that support a pose
-  double min_support = 0.35;           ///< least part of the points looked for that has to support the pose
-  double max_scale_difference = 0.35;  ///< points whose change of size differs more from the typical one are left out
-  double assumed_depth = 2.5;          ///< of points while nothing is known of it [m]
+  int levels = 2;           ///< number of levels of the pyramid besides the image
+  /** Largest distance between where a supporting point is found and where the pose sends it [px] */
+  double max_residual = 2.0;
+  int min_supporting = 15;    ///< least number of points that support a pose
+  double min_support = 0.35;  ///< least part of the points looked for that has to support the pose
+  /** Points whose change of size differs by more than this part from the typical one are left out. */
+  double max_scale_difference = 0.35;
+  double assumed_depth = 2.5;  ///< depth of points while nothing is known of it [m]
 
   /** All faults, one a line; empty when the parameters are usable. */
   std::vector<std::string> validate() const;
@@ -49,7 +50,11 @@ std::vector<Parameter> parameters(ViewTrackerParams& params);
 class ViewTracker
 {
 public:
-  /** @param reference 8-bit, one channel. The parameters must be valid. */
+  /**
+   * The parameters must be valid.
+   * @param reference the stored view as `camera` would have taken it; 8-bit, one channel. @param camera calibration of
+   * all images. @param mount where the camera is on the base.
+   */
   ViewTracker(const cv::Mat& reference, const Camera& camera, const CameraMount& mount,
               const ViewTrackerParams& params);
 
@@ -80,12 +85,13 @@ public:
 
   struct Result
   {
-    bool found = false;
-    PlanarPose pose;            ///< valid when found
-    int looked_for = 0;         ///< landmarks predicted to be in the image
+    bool found = false;  ///< whether enough landmarks support a pose
+    PlanarPose pose;     ///< valid when found
+    /** track(): landmarks predicted to be in the image, in about its scale; locate(): those matched. */
+    int looked_for = 0;
     int supporting = 0;         ///< landmarks found where the pose puts them
-    double rms = 0.0;           ///< of these [px]
-    double displacement = 0.0;  ///< median distance between where these are and where the stored view has them [px]
+    double rms = 0.0;           ///< root mean square of the supporting ones' residuals [px]
+    double displacement = 0.0;  ///< median distance of the supporting ones from where the stored view has them [px]
   };
 
   /**

@@ -26,7 +26,7 @@ struct LineMatcherParams
   RansacParams ransac;  ///< for points and lines; the inlier threshold is that of points [px]
   LinePlaneParams planes;
   double min_quality = 0.5;  ///< least MatchedLine::score of a match
-  std::uint64_t seed = 1;
+  std::uint64_t seed = 1;    ///< fixes all random draws
 
   LineMatcherParams();
 

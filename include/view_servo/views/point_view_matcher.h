@@ -39,9 +39,9 @@ struct PointViewMatcherParams
 {
   PointMatcherParams points;
   RansacParams ransac;
-  GeometryEstimator estimator = GeometryEstimator::RANSAC;
-  MultiHypothesisParams hypotheses;  ///< `sampling` is chosen by `estimator`
-  ViewConsistency view_consistency = ViewConsistency::WITHIN;
+  GeometryEstimator estimator = GeometryEstimator::RANSAC;     ///< how the geometry is found
+  MultiHypothesisParams hypotheses;                            ///< `sampling` is chosen by `estimator`
+  ViewConsistency view_consistency = ViewConsistency::WITHIN;  ///< where five points are tested
   ViewConsistencyParams consistency;
   bool guided = true;  ///< look for more matches along the geometry found
   GuidedParams guidance;
@@ -51,7 +51,7 @@ struct PointViewMatcherParams
   double first_share = 0.6;
   bool scale_search = true;  ///< try other scale ratios and coarser scales when the full images give no geometry
   double min_log_significance = 6.0;  ///< least ViewMatch::log_significance of a geometry that is accepted
-  std::uint64_t seed = 1;
+  std::uint64_t seed = 1;             ///< fixes all random draws
 
   /** All faults, one a line; empty when the parameters are usable. */
   std::vector<std::string> validate() const;

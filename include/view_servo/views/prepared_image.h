@@ -65,7 +65,7 @@ public:
     return region_;
   }
 
-  /** The reduced image; small ones (a side under 64 px) are empty, and so are their features. */
+  /** The image of level `number`; small ones (a side under 64 px) are empty, and so are their features. */
   const cv::Mat& image(int number) const;
   const PointFeatures& points(int number) const;
   const ProfileIndex& profileIndex(int number) const;

@@ -32,21 +32,25 @@ enum class MatchOutcome
 struct MatchedPoint
 {
   Correspondence position;  ///< pixels of the full images
-  double score;  ///< larger is better: association weight of corners, lower quality of the two lines that intersect
-  bool inlier;   ///< agrees with the geometry that was found
+  /**
+   * Larger is better: for corners the weight of their association; for intersections the lower score of the two lines.
+   */
+  double score;
+  bool inlier;  ///< agrees with the geometry that was found
 };
 
 /** A line segment matched by LineViewMatcher. */
 struct MatchedLine
 {
-  Segment reference;  ///< pixels of the full images
-  Segment current;
-  int reference_index;  ///< among the segments given to the image's LineFeatures
-  int current_index;
-  double score;    ///< quality: mean of common share and correlation, in [0, 1]
-  int plane = -1;  ///< index into ViewMatch::planes; -1 = none
+  Segment reference;    ///< in pixels of the full reference image
+  Segment current;      ///< in pixels of the full current image
+  int reference_index;  ///< index of `reference` among the segments given to its image's LineFeatures
+  int current_index;    ///< index of `current` among the segments given to its image's LineFeatures
+  double score;         ///< quality: mean of common share and correlation, in [0, 1]
+  int plane = -1;       ///< index into ViewMatch::planes; -1 = none
 };
 
+/** How long one stage of matching took. */
 struct StageTime
 {
   std::string name;
@@ -64,14 +68,14 @@ struct ViewMatch
   int inliers = 0;                    ///< data that agree with `matrix`: points; for LineViewMatcher's H, lines
   double rms_error = 0.0;   ///< of the inliers: transfer error in one image (H) or Sampson distance (F) [px]; NaN: none
   RansacStatistics ransac;  ///< of the attempt that succeeded, else of the last
-  std::vector<StageTime> stages;
-  double elapsed_ms = 0.0;
+  std::vector<StageTime> stages;  ///< in the order of their ends
+  double elapsed_ms = 0.0;        ///< of the whole match [ms]
 
   /** @name Set by PointViewMatcher only; zero otherwise.
    * @{ */
   double log_significance = 0.0;  ///< -log10 of the expected number of geometries this good among chance matches
-  int reference_level = 0;        ///< of PreparedImage, where the geometry was found
-  int current_level = 0;
+  int reference_level = 0;        ///< level of the reference PreparedImage at which the geometry was found
+  int current_level = 0;          ///< the same of the current one
   /** @} */
 
   /** @name Set by LineViewMatcher only; empty and NaN otherwise.

@@ -19,21 +19,21 @@ namespace view_servo
 /** A pose as tf gives it: maps points of the view's frame into `frame`. Metres. */
 struct ViewPose
 {
-  std::string frame;
-  Eigen::Vector3d position = Eigen::Vector3d::Zero();
-  Eigen::Quaterniond orientation = Eigen::Quaterniond::Identity();
+  std::string frame;                                                ///< the frame that the pose is in
+  Eigen::Vector3d position = Eigen::Vector3d::Zero();               ///< origin of the view's frame [m]
+  Eigen::Quaterniond orientation = Eigen::Quaterniond::Identity();  ///< turns vectors of the view's frame into `frame`
 };
 
 /** A picture of where the camera should be, with all that was known when it was taken. */
 struct StoredView
 {
-  std::string name;  ///< see isValidViewName()
-  cv::Mat image;     ///< 8-bit grey
-  cv::Rect region;   ///< region of interest [px]; empty = the whole image
-  std::optional<Camera> camera;
+  std::string name;              ///< see isValidViewName()
+  cv::Mat image;                 ///< 8-bit grey
+  cv::Rect region;               ///< region of interest [px]; empty = the whole image
+  std::optional<Camera> camera;  ///< its calibration; empty: not known
   double stamp = 0.0;            ///< when the image was taken [s since the epoch of its clock]
   std::string frame_id;          ///< optical frame of the camera, may be empty
-  std::optional<ViewPose> pose;  ///< of `frame_id`, where tf knew it
+  std::optional<ViewPose> pose;  ///< pose of the frame `frame_id`; empty where tf did not know it
 };
 
 /** Why a view cannot be stored, read or removed; what() names the view, in one line. */
@@ -47,8 +47,8 @@ public:
 bool isValidViewName(const std::string& name);
 
 /**
- * The camera that a view was taken with. For one that was stored without a calibration this is `current`, the camera that
- * is there now. @throws std::runtime_error when its image is of neither, and when its calibration cannot be used.
+ * The camera that a view was taken with. For one that was stored without a calibration this is `current`, the camera
+ * that is there now. @throws std::runtime_error when its image is of neither, and when its calibration cannot be used.
  */
 Camera cameraOf(const StoredView& view, const Camera& current);
 
@@ -58,8 +58,8 @@ Camera cameraOf(const StoredView& view, const Camera& current);
  * A view exists when its yaml file does: it names the image, its size and checksum, and is put in place by rename(2)
  * after image and yaml were written and synced. So a crash leaves either the old view or the new one, and at most an
  * unreferenced file, which the next save or removal of that name deletes. No other file is touched. Views do not share
- * files: a damaged one is reported by name and the others stay usable. Several processes may use a directory; those that
- * change it take turns by a file `.lock` in it, and of two that save one name the last one wins.
+ * files: a damaged one is reported by name and the others stay usable. Several processes may use a directory; those
+ * that change it take turns by a file `.lock` in it, and of two that save one name the last one wins.
  */
 class ViewStore
 {
@@ -86,8 +86,8 @@ public:
 
   struct Damaged
   {
-    std::string name;
-    std::string reason;
+    std::string name;    ///< of the view
+    std::string reason;  ///< why it cannot be read, in one line
   };
   struct Listing
   {
