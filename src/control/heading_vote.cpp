@@ -92,6 +92,20 @@ HeadingHistogram::HeadingHistogram(const HeadingEvidence& evidence, double yaw, 
   votes_ = smoothed(votes_, params.smoothing / bin_width);
 }
 
+std::vector<double> HeadingHistogram::votesFor(double yaw) const
+{
+  // As headings ahead and behind are one, the first bin comes after the last, which has the same heading.
+  const auto count = static_cast<double>(votes_.size() - 1);
+  std::vector<double> result(votes_.size());
+  for (std::size_t bin = 0; bin < result.size(); ++bin)
+  {
+    const double in_camera = std::remainder(heading(bin) - yaw, M_PI);
+    result[bin] =
+        yaw == 0.0 ? votes_[bin] : votes_[static_cast<std::size_t>(std::round((in_camera + M_PI_2) / M_PI * count))];
+  }
+  return result;
+}
+
 double HeadingHistogram::heading(std::size_t bin) const
 {
   return -M_PI_2 + M_PI * static_cast<double>(bin) / static_cast<double>(votes_.size() - 1);

@@ -60,10 +60,11 @@ protected:
       return;  // not yet seen from where the last step ended
     }
     const HeadingHistogram histogram(evidence, 0.0, params_.vote);
-    report_.histogram = histogram.votes();
+    const double camera_yaw = target_.mount.on_base.yaw;
+    report_.histogram = histogram.votesFor(camera_yaw);
     const std::optional<double> chosen = region_.choose(histogram);
-    report_.roi_min = region_.min();
-    report_.roi_max = region_.max();
+    report_.roi_min = camera_yaw + region_.min();
+    report_.roi_max = camera_yaw + region_.max();
     if (!chosen)
     {
       return;
@@ -176,7 +177,7 @@ protected:
     const bool any = !hypotheses_.list().empty();
     const PlanarPose followed = view_in_odom_ ? compose(inverse(camera_in_odom), *view_in_odom_)
                                               : (any ? hypotheses_.list().front().view_in_camera : PlanarPose());
-    report_.histogram = HeadingHistogram(evidence, followed.yaw, params_.vote).votes();
+    report_.histogram = HeadingHistogram(evidence, followed.yaw, params_.vote).votesFor(target_.mount.on_base.yaw);
     if (ended() || !any)
     {
       return;

@@ -56,6 +56,8 @@ public:
   {
     return votes_;
   }
+  /** The votes over headings in a frame in which the camera is turned by `yaw`, as on a base [rad]. */
+  std::vector<double> votesFor(double yaw) const;
   /** Heading of a bin's middle [rad]. */
   double heading(std::size_t bin) const;
   /** The bin with most votes whose heading lies in [min, max]; empty when none has any. */

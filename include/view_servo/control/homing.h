@@ -92,9 +92,9 @@ struct HomingReport
    * bin.
    */
   double confidence = 0.0;
-  /** HeadingHistogram::votes() of the last matches used, over headings of the camera; empty before. */
+  /** HeadingHistogram::votesFor() base_link, of the last matches used; empty before. */
   std::vector<double> histogram;
-  /** Smallest heading at which the view is expected next [rad]; mode SERVO: in base_link, THESIS: of the camera. */
+  /** Smallest heading in base_link at which the view is expected next [rad]. */
   double roi_min = std::numeric_limits<double>::quiet_NaN();
   double roi_max = std::numeric_limits<double>::quiet_NaN();     ///< the largest such heading [rad]
   double similarity = std::numeric_limits<double>::quiet_NaN();  ///< gradientSimilarity(), in [-1, 1]
