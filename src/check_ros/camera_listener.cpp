@@ -103,7 +103,6 @@ void CameraListener::pair(const sensor_msgs::ImageConstPtr& image, const sensor_
 
 CameraObservations CameraListener::observations(const RosGraph& graph, double duration) const
 {
-  constexpr double MAX_AGE = 1.0;  // as ~max_image_age [s]
   CameraObservations camera;
   camera.images.topic = topics_.image;
   camera.infos.topic = topics_.info;
@@ -124,7 +123,7 @@ CameraObservations CameraListener::observations(const RosGraph& graph, double du
   camera.height = static_cast<int>(image.height);
   camera.encoding = image.encoding;
   camera.frame = image.header.frame_id;
-  camera.age_fault = faultOfAge(image.header.stamp, topics_.image, MAX_AGE);
+  camera.age_fault = faultOfAge(image.header.stamp, topics_.image, CameraInputParams().max_image_age);
   if (frame_)
   {
     camera.calibration_fault = faultOf(*frame_->image, *frame_->info, topics_);

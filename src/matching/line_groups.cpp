@@ -196,7 +196,7 @@ private:
     pairs_ = std::move(all);
   }
 
-  /** The pairs that are among the closest of at least one of their segments. */
+  /** Takes pairs, the closest first, as long as neither of their segments has as many as it may. */
   std::vector<Pair> closest(std::vector<Pair>& all) const
   {
     std::stable_sort(all.begin(), all.end(), [](const Pair& a, const Pair& b) { return a.distance < b.distance; });

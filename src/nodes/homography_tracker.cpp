@@ -10,6 +10,7 @@
 #include "view_servo/ros/plane_searcher.h"
 #include "view_servo/ros/plane_session.h"
 #include "view_servo/ros/session_starter.h"
+#include "view_servo/ros/timings.h"
 #include "view_servo/ros/view_choice.h"
 #include "view_servo/tracking/plane_finder.h"
 #include "view_servo/tracking/plane_tracker.h"
@@ -22,12 +23,10 @@
 #include <std_srvs/Trigger.h>
 #include <Eigen/Geometry>
 
-#include <algorithm>
 #include <atomic>
 #include <chrono>
 #include <condition_variable>
 #include <cstdint>
-#include <limits>
 #include <memory>
 #include <mutex>
 #include <optional>
@@ -330,10 +329,7 @@ private:
       overlay_publisher_.publish(toImage(session_->overlay(text), sensor_msgs::image_encodings::BGR8, header));
     }
     const std::lock_guard<std::mutex> lock(mutex_);
-    const double ms = 1e3 * std::chrono::duration<double>(Clock::now() - begin_time).count();
-    images_ += 1;
-    ms_sum_ += ms;
-    ms_max_ = std::max(ms_max_, ms);
+    timings_.add(1e3 * std::chrono::duration<double>(Clock::now() - begin_time).count());
   }
 
   // ----------------------------------------------------------------------------------------------------- publishing
@@ -404,7 +400,6 @@ private:
 
   void diagnose(diagnostic_updater::DiagnosticStatusWrapper& status)
   {
-    constexpr double NOT_A_NUMBER = std::numeric_limits<double>::quiet_NaN();
     const std::lock_guard<std::mutex> lock(mutex_);
     const ChosenView& chosen = choice_.chosen();
     const bool worrying = !chosen.view.empty() && status_.state != TrackingState::TRACKING;
@@ -414,10 +409,7 @@ private:
     status.add("View", chosen.view);
     status.add("Goal", chosen.goal);
     status.add("Points", status_.points);
-    status.add("Time an image, mean [ms]", images_ > 0 ? ms_sum_ / images_ : NOT_A_NUMBER);
-    status.add("Time an image, largest [ms]", images_ > 0 ? ms_max_ : NOT_A_NUMBER);
-    images_ = 0;
-    ms_sum_ = ms_max_ = 0.0;
+    timings_.report(status, "Time an image");
   }
 
   static constexpr std::chrono::milliseconds REPORT_PERIOD{ 500 };
@@ -434,9 +426,7 @@ private:
   std::unique_ptr<PlaneSession> prepared_;  // of the choice, for the follower
   std::optional<CameraFrame> newest_;
   Status status_;
-  int images_ = 0;  // since the last diagnosis
-  double ms_sum_ = 0.0;
-  double ms_max_ = 0.0;
+  Timings timings_;  // of images
   std::atomic<bool> stopping_{ false };
 
   // The follower's own.

@@ -4,11 +4,17 @@
 import atexit
 import ctypes
 import os
+import re
+import shutil
 import signal
 import socket
 import subprocess
+import tempfile
 import time
+import unittest
 import xmlrpc.client
+
+import rospy
 
 CALLER = "/documents"
 
@@ -105,3 +111,21 @@ class Graph:
                 with open(os.path.join(self.directory, name), errors="replace") as file:
                     texts.append("--- %s\n%s" % (name, file.read()[-3000:]))
         return "\n".join(texts)
+
+
+class GraphTest(unittest.TestCase):
+    """A test with a master of its own, and this process as a node under it."""
+
+    @classmethod
+    def setUpClass(cls):
+        name = re.sub(r"(?<=[a-z])(?=[A-Z])", "_", cls.__name__).lower() + "_test"
+        cls.directory = tempfile.mkdtemp(prefix="view_servo_%s_" % name)
+        cls.graph = Graph(cls.directory)
+        os.environ.update(ROS_MASTER_URI=cls.graph.uri, ROS_HOSTNAME="localhost")
+        rospy.init_node(name, disable_signals=True)
+
+    @classmethod
+    def tearDownClass(cls):
+        rospy.signal_shutdown("the tests have ended")
+        cls.graph.stop()
+        shutil.rmtree(cls.directory, ignore_errors=True)

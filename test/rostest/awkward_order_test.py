@@ -7,11 +7,9 @@ robot that has it, seconds after everything else. Nodes have to live, their serv
 wait for it.
 """
 import os
-import shutil
 import signal
 import subprocess
 import sys
-import tempfile
 import threading
 import time
 import unittest
@@ -67,21 +65,8 @@ class Camera:
             publisher.unregister()
 
 
-class AwkwardOrder(unittest.TestCase):
+class AwkwardOrder(graph.GraphTest):
     """Each test starts one launch file's nodes under the same master, and stops them."""
-
-    @classmethod
-    def setUpClass(cls):
-        cls.directory = tempfile.mkdtemp(prefix="view_servo_awkward_")
-        cls.graph = graph.Graph(cls.directory)
-        os.environ.update(ROS_MASTER_URI=cls.graph.uri, ROS_HOSTNAME="localhost")
-        rospy.init_node("awkward_order_test", disable_signals=True)
-
-    @classmethod
-    def tearDownClass(cls):
-        rospy.signal_shutdown("the tests have ended")
-        cls.graph.stop()
-        shutil.rmtree(cls.directory, ignore_errors=True)
 
     def setUp(self):
         self.nodes = {}  # by name

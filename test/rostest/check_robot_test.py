@@ -9,11 +9,9 @@ messages by a relay in this process.
 import collections
 import json
 import os
-import shutil
 import signal
 import subprocess
 import sys
-import tempfile
 import threading
 import unittest
 
@@ -216,11 +214,10 @@ class Relay:
         self.thread.join()
 
 
-class CheckRobot(unittest.TestCase):
+class CheckRobot(graph.GraphTest):
     @classmethod
     def setUpClass(cls):
-        cls.directory = tempfile.mkdtemp(prefix="view_servo_check_robot_")
-        cls.graph = graph.Graph(cls.directory)
+        super().setUpClass()
         cls.relay = None
         try:
             cls.start()
@@ -230,11 +227,9 @@ class CheckRobot(unittest.TestCase):
 
     @classmethod
     def start(cls):
-        os.environ.update(ROS_MASTER_URI=cls.graph.uri, ROS_HOSTNAME="localhost")
         cls.graph.start("roslaunch", "view_servo", "nomad_sim.launch")
         # In a namespace, with prefixed frames: so check_robot is tried there, too.
         cls.graph.start("env", "ROS_NAMESPACE=arm", "roslaunch", "view_servo", "puma_sim.launch", "frame_prefix:=arm")
-        rospy.init_node("check_robot_test", disable_signals=True)
         cls.relay = Relay()
         cls.relay.publish_frames()
         for topic in ("/camera/camera_info", "/arm/camera/camera_info", "/odom", "/arm/joint_states"):
@@ -244,9 +239,7 @@ class CheckRobot(unittest.TestCase):
     def tearDownClass(cls):
         if cls.relay:
             cls.relay.stop()
-        rospy.signal_shutdown("the tests have ended")
-        cls.graph.stop()
-        shutil.rmtree(cls.directory, ignore_errors=True)
+        super().tearDownClass()
 
     # ---------------------------------------------------------------------------------------------------------- steps
 

@@ -4,10 +4,8 @@
 """Whole runs during which the nodes that tell a driver where its view is are stopped for a while by SIGSTOP, as a machine
 that is short of memory or processors does: the robot stands, says why, and arrives after they go on."""
 import os
-import shutil
 import signal
 import sys
-import tempfile
 import time
 import unittest
 import xmlrpc.client
@@ -29,20 +27,7 @@ def is_zero(twist):
     return not any((twist.linear.x, twist.linear.y, twist.linear.z, twist.angular.x, twist.angular.y, twist.angular.z))
 
 
-class StoppedPeers(unittest.TestCase):
-    @classmethod
-    def setUpClass(cls):
-        cls.directory = tempfile.mkdtemp(prefix="view_servo_stopped_peers_")
-        cls.graph = graph.Graph(cls.directory)
-        os.environ.update(ROS_MASTER_URI=cls.graph.uri, ROS_HOSTNAME="localhost")
-        rospy.init_node("stopped_peers", disable_signals=True)
-
-    @classmethod
-    def tearDownClass(cls):
-        rospy.signal_shutdown("the test has ended")
-        cls.graph.stop()
-        shutil.rmtree(cls.directory, ignore_errors=True)
-
+class StoppedPeers(graph.GraphTest):
     def setUp(self):
         self.commands = []  # (steady time, twist)
         self.statuses = []
@@ -70,6 +55,14 @@ class StoppedPeers(unittest.TestCase):
     def go_on(self):
         while self.stopped:
             os.kill(self.stopped.pop(), signal.SIGCONT)
+
+    def kill(self, nodes):
+        for node in nodes:
+            os.kill(self.pid_of(node), signal.SIGKILL)
+        return time.monotonic()
+
+    def last_motion(self):
+        return max(moment for moment, twist in self.commands if not is_zero(twist))
 
     def listen(self, message, twist_of):
         def take_command(command):
@@ -99,8 +92,7 @@ class StoppedPeers(unittest.TestCase):
         graph.wait_until("a stand", lambda: not self.moves(), 5.0)
         graph.wait_until("the end of the pause", lambda: time.monotonic() > since + STOPPED)
         self.assertFalse(self.moves())
-        last_motion = max(moment for moment, twist in self.commands if not is_zero(twist))
-        self.assertLess(last_motion - since, 1.0)
+        self.assertLess(self.last_motion() - since, 1.0)
         self.assertEqual(self.statuses[-1].state, ServoStatus.LOST)
         self.assertNotEqual(self.statuses[-1].reason, "")
         self.go_on()
@@ -112,6 +104,24 @@ class StoppedPeers(unittest.TestCase):
         since = self.stop(["/point_matcher", "/line_matcher"])
         graph.wait_until("the end of the pause", lambda: time.monotonic() > since + STOPPED)
         self.go_on()
+        self.assert_arrives(process, result)
+
+    def test_arm_whose_tracker_dies(self):
+        self.listen(TwistStamped, lambda command: command.twist)
+        process, _ = self.begin("arm_servo.launch")
+        since = self.kill(["/homography_tracker"])
+        process.wait(PATIENCE)  # it ends with a node that it needs
+        self.assertLess(self.last_motion() - since, 1.0)
+        self.assertTrue(is_zero(self.commands[-1][1]))
+
+    def test_base_whose_matchers_die_and_return(self):
+        self.listen(Twist, lambda command: command)
+        process, result = self.begin("homing.launch")
+        since = self.kill(["/point_matcher", "/line_matcher"])
+        graph.wait_until("the end of the pause", lambda: time.monotonic() > since + STOPPED)
+        for matcher in ("point_matcher", "line_matcher"):  # with the parameters that the launch file gave them
+            self.graph.start("rosrun", "view_servo", matcher, "image_raw:=camera/image_raw",
+                             "camera_info:=camera/camera_info", "wanted_view:=homing/wanted_view")
         self.assert_arrives(process, result)
 
 

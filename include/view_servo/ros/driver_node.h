@@ -5,19 +5,18 @@
 #include "view_servo/control/goal_rules.h"
 #include "view_servo/ros/driver_context.h"
 #include "view_servo/ros/inbox.h"
+#include "view_servo/ros/timings.h"
 
 #include <actionlib/server/action_server.h>
 #include <diagnostic_msgs/DiagnosticStatus.h>
 #include <diagnostic_updater/DiagnosticStatusWrapper.h>
 
-#include <algorithm>
 #include <atomic>
 #include <chrono>
 #include <cmath>
 #include <condition_variable>
 #include <cstdint>
 #include <exception>
-#include <limits>
 #include <memory>
 #include <mutex>
 #include <optional>
@@ -449,9 +448,7 @@ private:
     const std::optional<double> age = driver_.takeLatency();
     if (age)
     {
-      cycles_ += 1;
-      cycle_sum_ += *age;
-      cycle_max_ = std::max(cycle_max_, *age);
+      latencies_.add(*age);
       Feedback feedback;
       driver_.fill(feedback, status);
       goal_->handle.publishFeedback(feedback);
@@ -489,7 +486,6 @@ private:
 
   void diagnose(diagnostic_updater::DiagnosticStatusWrapper& status)
   {
-    constexpr double NOT_A_NUMBER = std::numeric_limits<double>::quiet_NaN();
     const std::lock_guard<std::mutex> lock(mutex_);
     const ServoStatus& last = status_.last();
     const bool worrying = last.state == ServoStatus::LOST || last.state == ServoStatus::ABORTED;
@@ -497,15 +493,12 @@ private:
                    last.reason);
     status.add("Enabled", gate_.enabled());
     status.add("Dry run", gate_.dryRun());
-    status.add("Image to command, mean [ms]", cycles_ > 0 ? cycle_sum_ / cycles_ : NOT_A_NUMBER);
-    status.add("Image to command, largest [ms]", cycles_ > 0 ? cycle_max_ : NOT_A_NUMBER);
+    latencies_.report(status, "Image to command");
     for (const std::unique_ptr<DriverInput>& input : inputs_)
     {
       status.add("Age of " + input->what() + " [s]", input->age());
     }
     driver_.diagnose(status);
-    cycles_ = 0;
-    cycle_sum_ = cycle_max_ = 0.0;
   }
 
   const Params params_;
@@ -522,9 +515,7 @@ private:
   std::uint64_t prepared_serial_ = 0;
   bool replaced_ = false;
   bool stopping_ = false;
-  int cycles_ = 0;          // with a latency, since the last diagnosis
-  double cycle_sum_ = 0.0;  // of latencies [ms]
-  double cycle_max_ = 0.0;
+  Timings latencies_;
 
   StatusOutput status_;
   Server server_;

@@ -1,0 +1,40 @@
+// Copyright (c) 2026, the view_servo authors
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <diagnostic_updater/DiagnosticStatusWrapper.h>
+
+#include <algorithm>
+#include <limits>
+#include <string>
+
+namespace view_servo
+{
+/** How long something took that happens again and again, from one diagnosis to the next. Not guarded against threads. */
+class Timings
+{
+public:
+  /** @param duration [ms]. */
+  void add(double duration)
+  {
+    count_ += 1;
+    sum_ += duration;
+    largest_ = std::max(largest_, duration);
+  }
+
+  /** Adds mean and largest, NaN when there were none, under "NAME, mean [ms]" and "NAME, largest [ms]"; begins anew. */
+  void report(diagnostic_updater::DiagnosticStatusWrapper& status, const std::string& name)
+  {
+    constexpr double NOT_A_NUMBER = std::numeric_limits<double>::quiet_NaN();
+    status.add(name + ", mean [ms]", count_ > 0 ? sum_ / count_ : NOT_A_NUMBER);
+    status.add(name + ", largest [ms]", count_ > 0 ? largest_ : NOT_A_NUMBER);
+    *this = Timings();
+  }
+
+private:
+  int count_ = 0;
+  double sum_ = 0.0;
+  double largest_ = 0.0;
+};
+
+}  // namespace view_servo
