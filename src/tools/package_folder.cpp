@@ -4,6 +4,7 @@
 
 #include <ros/package.h>
 
+#include <stdexcept>
 #include <string>
 
 namespace view_servo
@@ -17,7 +18,12 @@ std::filesystem::path packageFolder()
     return found;
   }
   const std::filesystem::path program = std::filesystem::read_symlink("/proc/self/exe");
-  return program.parent_path().parent_path().parent_path() / "share" / PACKAGE;
+  std::filesystem::path installed = program.parent_path().parent_path().parent_path() / "share" / PACKAGE;
+  if (!std::filesystem::exists(installed))
+  {
+    throw std::runtime_error("ROS does not find the package view_servo: source the setup.bash of its workspace");
+  }
+  return installed;
 }
 
 }  // namespace view_servo

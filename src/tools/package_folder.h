@@ -6,7 +6,10 @@
 
 namespace view_servo
 {
-/** The folder with `config/` and `urdf/` of this package: its source tree, or where it was installed. */
+/**
+ * The folder with `config/` and `urdf/` of this package: its source tree, or where it was installed.
+ * @throws std::runtime_error when ROS does not find the package, and this program is not installed.
+ */
 std::filesystem::path packageFolder();
 
 }  // namespace view_servo
