@@ -4,6 +4,7 @@
 
 #include <ros/xmlrpc_manager.h>
 
+#include <atomic>
 #include <csignal>
 #include <limits>
 #include <utility>
@@ -12,17 +13,17 @@ namespace view_servo
 {
 namespace
 {
-volatile std::sig_atomic_t g_shutdown_requested = 0;
+std::atomic<bool> g_shutdown_requested{ false };  // set by signals, read by several threads
 
 void requestShutdown(int /*signal*/)
 {
-  g_shutdown_requested = 1;
+  g_shutdown_requested = true;
 }
 
 /** The master's call, as `rosnode kill` makes it. */
 void shutdownCallback(XmlRpc::XmlRpcValue& /*parameters*/, XmlRpc::XmlRpcValue& result)
 {
-  g_shutdown_requested = 1;
+  g_shutdown_requested = true;
   result = ros::xmlrpc::responseInt(1, "", 0);
 }
 
@@ -87,7 +88,7 @@ bool isOutdated(const ServoStatus& last, const CommandGate& gate)
 
 void detail::deferShutdown()
 {
-  g_shutdown_requested = 0;
+  g_shutdown_requested = false;
   std::signal(SIGINT, requestShutdown);
   std::signal(SIGTERM, requestShutdown);
   ros::XMLRPCManager::instance()->unbind("shutdown");
@@ -96,7 +97,7 @@ void detail::deferShutdown()
 
 bool detail::shutdownRequested()
 {
-  return g_shutdown_requested != 0;
+  return g_shutdown_requested;
 }
 
 }  // namespace view_servo
