@@ -16,6 +16,7 @@
 #include "experiments/line_ground_truth.h"
 #include "experiments/lines_table.h"
 #include "experiments/profile_experiments.h"
+#include "experiments/rooms_experiment.h"
 #include "tools/command_line.h"
 
 #include <algorithm>
@@ -69,6 +70,8 @@ const std::vector<Experiment>& experiments()
       runProfileParametersExperiment },
     { "view_consistency", "tables 6.2 and 6.3: the view constraint before and within RANSAC", true,
       VIEW_CONSISTENCY_RUNS, runViewConsistencyExperiment },
+    { "rooms", "fundamental matrices between real views of rooms and buildings, beside SIFT and AKAZE", true,
+      std::nullopt, runRoomsExperiment },
     { "arm_geometry", "chapter 8: motions from homographies beside a real arm's", true, std::nullopt,
       runArmGeometryExperiment },
     { "cyclic_order", "figures 7.5 to 7.11: cyclic order against plain votes", false, DRAWN_PICTURES,

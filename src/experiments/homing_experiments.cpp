@@ -2,7 +2,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "experiments/homing_experiments.h"
 
-#include "experiments/input_file.h"
+#include "experiments/indoor_walk.h"
 #include "experiments/parallel.h"
 #include "experiments/statistics.h"
 #include "sim/world_reader.h"
@@ -187,62 +187,6 @@ void runHomingExperiment(const ExperimentContext& context, std::ostream& csv)
 
 namespace
 {
-/** What hololens_indoor holds. */
-struct IndoorWalk
-{
-  Camera camera;
-  std::map<std::string, Eigen::Isometry3d> poses;  ///< world from camera
-  struct Pair
-  {
-    std::string reference;
-    std::string current;
-    double baseline;  ///< [m]
-    double rotation;  ///< [degrees]
-    double overlap;
-  };
-  std::vector<Pair> pairs;  ///< each in both directions
-};
-
-IndoorWalk readIndoorWalk(const fs::path& folder)
-{
-  IndoorWalk walk;
-  std::ifstream k = openForReading(folder / "K.txt");
-  for (int i = 0; i < 9; ++i)
-  {
-    k >> walk.camera.k(i / 3, i % 3);
-  }
-  std::string line;
-  std::ifstream poses = openForReading(folder / "poses.txt");
-  while (std::getline(poses, line))
-  {
-    std::istringstream words(line);
-    std::string name;
-    Eigen::Isometry3d pose = Eigen::Isometry3d::Identity();
-    words >> name;
-    for (int i = 0; i < 16; ++i)
-    {
-      words >> pose.matrix()(i / 4, i % 4);
-    }
-    if (words && name.front() != '#')
-    {
-      walk.poses[name] = pose;
-    }
-  }
-  std::ifstream pairs = openForReading(folder / "pairs_wide_baseline.txt");
-  while (std::getline(pairs, line))
-  {
-    std::istringstream words(line);
-    IndoorWalk::Pair pair;
-    if (words >> pair.reference >> pair.current >> pair.baseline >> pair.rotation >> pair.overlap)
-    {
-      walk.pairs.push_back(pair);
-      std::swap(pair.reference, pair.current);
-      walk.pairs.push_back(pair);
-    }
-  }
-  return walk;
-}
-
 Correspondences onUnitPlane(const ViewMatch& match, const Camera& camera)
 {
   Correspondences pairs;
@@ -258,7 +202,7 @@ Correspondences onUnitPlane(const ViewMatch& match, const Camera& camera)
 void runDirectionsExperiment(const ExperimentContext& context, std::ostream& csv)
 {
   const fs::path folder = context.data / "hololens_indoor";
-  IndoorWalk walk = readIndoorWalk(folder);
+  IndoorWalk walk = readIndoorWalk(context.data);
   if (context.brief)
   {
     walk.pairs.resize(std::min<std::size_t>(walk.pairs.size(), 6));

@@ -1,0 +1,390 @@
+// Copyright (c) 2026, the view_servo authors
+// SPDX-License-Identifier: BSD-3-Clause
+#include "experiments/rooms_experiment.h"
+
+#include "experiments/indoor_walk.h"
+#include "experiments/point_pairs.h"
+#include "experiments/statistics.h"
+#include "view_servo/geometry/fundamental.h"
+#include "view_servo/images/image_io.h"
+#include "view_servo/views/line_view_matcher.h"
+#include "view_servo/views/point_view_matcher.h"
+#include "view_servo/views/prepared_image.h"
+
+#include <Eigen/LU>
+#include <Eigen/QR>
+#include <opencv2/calib3d.hpp>
+#include <opencv2/core.hpp>
+#include <opencv2/core/eigen.hpp>
+#include <opencv2/features2d.hpp>
+
+#include <algorithm>
+#include <cmath>
+#include <ctime>
+#include <functional>
+#include <iostream>
+#include <limits>
+#include <map>
+#include <optional>
+#include <ostream>
+#include <string>
+#include <utility>
+#include <vector>
+
+namespace view_servo
+{
+namespace
+{
+namespace fs = std::filesystem;
+
+constexpr double RIGHT = 3.0;   // an answer with less error [px]
+constexpr double WRONG = 10.0;  // with more it is grossly wrong
+
+struct Answer
+{
+  std::optional<Eigen::Matrix3d> f;
+  Correspondences inliers;
+};
+
+struct RoomPair
+{
+  std::string set;
+  std::string name;
+  cv::Mat reference;
+  cv::Mat current;
+  double baseline = std::numeric_limits<double>::quiet_NaN();  ///< [m]
+  double rotation = std::numeric_limits<double>::quiet_NaN();  ///< [degrees]
+  /** True matches, at which answers are measured; may depend on what all answers found. */
+  std::function<Correspondences(const std::vector<Answer>&)> truth;
+};
+
+// -------------------------------------------------------------------------------------------------------- the pairs
+
+/** Two views of a walk, and how the camera moved between them. */
+struct WalkPair
+{
+  Camera camera;
+  Eigen::Isometry3d current_from_reference;
+  cv::Size size;
+
+  /** Whether a match may be of one point before both cameras. */
+  bool agrees(const Correspondence& match) const
+  {
+    constexpr double AGREES = 1.5;  // [px]
+    const Eigen::Vector3d translation = current_from_reference.translation();
+    Eigen::Matrix3d cross;
+    cross << 0.0, -translation.z(), translation.y(), translation.z(), 0.0, -translation.x(), -translation.y(),
+        translation.x(), 0.0;
+    const Eigen::Matrix3d inverse = camera.k.inverse();
+    const Eigen::Matrix3d f = inverse.transpose() * cross * current_from_reference.linear() * inverse;
+    if (sampsonError(f, match) > AGREES * AGREES)
+    {
+      return false;
+    }
+    Eigen::Matrix<double, 3, 2> rays;
+    rays << current_from_reference.linear() * (inverse * match.reference.homogeneous()),
+        -(inverse * match.current.homogeneous());
+    const Eigen::Vector2d depths = rays.colPivHouseholderQr().solve(-translation);
+    return depths.minCoeff() > 0.0;
+  }
+
+  /** What both views show of points all over the reference image at these depths. */
+  Correspondences matchesAt(const std::vector<double>& depths) const
+  {
+    constexpr int COLUMNS = 12;
+    constexpr int ROWS = 8;
+    const cv::Rect2d frame(0.0, 0.0, size.width, size.height);
+    Correspondences matches;
+    for (int i = 0; i < ROWS * COLUMNS; ++i)
+    {
+      const Eigen::Vector2d at((i % COLUMNS + 0.5) * size.width / COLUMNS, (i / COLUMNS + 0.5) * size.height / ROWS);
+      for (const double depth : depths)
+      {
+        const Eigen::Vector3d point = current_from_reference * (depth * (camera.k.inverse() * at.homogeneous()));
+        const Eigen::Vector2d seen = (camera.k * point).hnormalized();
+        if (point.z() > 0.0 && frame.contains({ seen.x(), seen.y() }))
+        {
+          matches.push_back({ at, seen });
+        }
+      }
+    }
+    return matches;
+  }
+};
+
+/**
+ * The true ones among all matches that anything found, one for each cell of the reference image; where these are few,
+ * points at depths that rooms have.
+ */
+Correspondences trueMatches(const WalkPair& walk, const std::vector<Answer>& answers)
+{
+  constexpr std::size_t ENOUGH = 20;
+  constexpr double CELL = 20.0;  // [px]
+  std::map<std::pair<int, int>, Correspondence> of_cell;
+  for (const Answer& answer : answers)
+  {
+    for (const Correspondence& match : answer.inliers)
+    {
+      if (walk.agrees(match))
+      {
+        of_cell.emplace(
+            std::pair(static_cast<int>(match.reference.x() / CELL), static_cast<int>(match.reference.y() / CELL)),
+            match);
+      }
+    }
+  }
+  if (of_cell.size() < ENOUGH)
+  {
+    return walk.matchesAt({ 2.0, 3.0, 4.5 });
+  }
+  Correspondences matches;
+  for (const auto& [cell, match] : of_cell)
+  {
+    matches.push_back(match);
+  }
+  return matches;
+}
+
+std::vector<RoomPair> walkPairs(const fs::path& data)
+{
+  const IndoorWalk walk = readIndoorWalk(data);
+  std::vector<RoomPair> pairs;
+  for (std::size_t i = 0; i < walk.pairs.size(); i += 2)  // in one direction
+  {
+    const IndoorWalk::Pair& known = walk.pairs[i];
+    RoomPair pair;
+    pair.set = "hololens_indoor";
+    pair.name = fs::path(known.reference).stem().string() + "-" + fs::path(known.current).stem().string();
+    pair.reference = readGreyImage((data / pair.set / "images" / known.reference).string());
+    pair.current = readGreyImage((data / pair.set / "images" / known.current).string());
+    const WalkPair motion{ walk.camera, walk.poses.at(known.current).inverse() * walk.poses.at(known.reference),
+                           pair.reference.size() };
+    pair.truth = [motion](const std::vector<Answer>& answers) {
+      return trueMatches(motion, answers);
+    };
+    pair.baseline = known.baseline;
+    pair.rotation = known.rotation;
+    pairs.push_back(std::move(pair));
+  }
+  return pairs;
+}
+
+RoomPair toRoomPair(const std::string& set, PointPair&& pair)
+{
+  RoomPair result;
+  result.set = set;
+  result.name = pair.name;
+  result.reference = pair.reference;
+  result.current = pair.current;
+  result.truth = [points = std::move(pair.points)](const std::vector<Answer>&) {
+    return points;
+  };
+  return result;
+}
+
+std::vector<RoomPair> allPairs(const fs::path& data)
+{
+  std::vector<RoomPair> pairs = walkPairs(data);
+  for (const std::string& name : kusvodPairs())
+  {
+    pairs.push_back(toRoomPair("kusvod2", readKusvodPair(data, name)));
+  }
+  return pairs;
+}
+
+// ------------------------------------------------------------------------------------------------------ the methods
+
+/** Ours, with both pictures prepared anew. */
+template <typename Matcher>
+Answer answerOf(const Matcher& matcher, const FeatureParams& features, const RoomPair& pair)
+{
+  const PreparedImage reference(pair.reference, cv::Rect(), features);
+  const PreparedImage current(pair.current, cv::Rect(), features);
+  const ViewMatch match = matcher.match(reference, current, GeometryModel::FUNDAMENTAL);
+  Answer answer;
+  for (const MatchedPoint& point : match.matches)
+  {
+    if (point.inlier)
+    {
+      answer.inliers.push_back(point.position);
+    }
+  }
+  if (match.outcome == MatchOutcome::MATCHED)
+  {
+    answer.f = match.matrix;
+  }
+  return answer;
+}
+
+using Method = std::pair<std::string, std::function<Answer(const RoomPair&)>>;
+
+#if CV_VERSION_MAJOR > 4 || (CV_VERSION_MAJOR == 4 && CV_VERSION_MINOR >= 5)
+/** Key points, ratio test at 0.8, MAGSAC; an answer has 15 inliers at least. */
+Answer answerOfPeer(const cv::Ptr<cv::Feature2D>& detector, const cv::Ptr<cv::DescriptorMatcher>& matcher,
+                    const RoomPair& pair)
+{
+  constexpr float RATIO = 0.8F;
+  constexpr std::size_t ENOUGH = 15;
+  std::vector<cv::KeyPoint> reference_points;
+  std::vector<cv::KeyPoint> current_points;
+  cv::Mat reference_descriptors;
+  cv::Mat current_descriptors;
+  detector->detectAndCompute(pair.reference, cv::noArray(), reference_points, reference_descriptors);
+  detector->detectAndCompute(pair.current, cv::noArray(), current_points, current_descriptors);
+  std::vector<cv::Point2f> from;
+  std::vector<cv::Point2f> to;
+  if (reference_points.size() >= 2 && current_points.size() >= 2)
+  {
+    std::vector<std::vector<cv::DMatch>> matches;
+    matcher->knnMatch(reference_descriptors, current_descriptors, matches, 2);
+    for (const std::vector<cv::DMatch>& best : matches)
+    {
+      if (best.size() == 2 && best[0].distance < RATIO * best[1].distance)
+      {
+        from.push_back(reference_points[static_cast<std::size_t>(best[0].queryIdx)].pt);
+        to.push_back(current_points[static_cast<std::size_t>(best[0].trainIdx)].pt);
+      }
+    }
+  }
+  if (from.size() < ENOUGH)
+  {
+    return {};
+  }
+  std::vector<unsigned char> mask;
+  const cv::Mat f = cv::findFundamentalMat(from, to, cv::USAC_MAGSAC, 1.0, 0.999, 10000, mask);
+  Answer answer;
+  for (std::size_t i = 0; i < mask.size(); ++i)
+  {
+    if (mask[i] != 0)
+    {
+      answer.inliers.push_back({ { from[i].x, from[i].y }, { to[i].x, to[i].y } });
+    }
+  }
+  if (f.rows == 3 && answer.inliers.size() >= ENOUGH)
+  {
+    Eigen::Matrix3d matrix;
+    cv::cv2eigen(f, matrix);
+    answer.f = matrix;
+  }
+  return answer;
+}
+
+std::vector<Method> peers()
+{
+  const auto sift = [](int count) {
+    return [count](const RoomPair& pair) {
+      return answerOfPeer(cv::SIFT::create(count), cv::makePtr<cv::FlannBasedMatcher>(), pair);
+    };
+  };
+  return { { "SIFT 500", sift(500) },
+           { "SIFT all", sift(0) },
+           { "AKAZE", [](const RoomPair& pair) {
+              return answerOfPeer(cv::AKAZE::create(), cv::makePtr<cv::BFMatcher>(cv::NORM_HAMMING), pair);
+            } } };
+}
+#else
+std::vector<Method> peers()
+{
+  std::cerr << "without SIFT and AKAZE: MAGSAC comes with OpenCV 4.5" << std::endl;
+  return {};
+}
+#endif
+
+std::vector<Method> ours()
+{
+  const PointViewMatcher points{ PointViewMatcherParams() };
+  const LineViewMatcher lines{ LineMatcherParams() };
+  FeatureParams features;
+  features.points = points.params().points;
+  features.segments = lines.params().segments;
+  features.lines = lines.params().features;
+  return { { "points",
+             [=](const RoomPair& pair) {
+               return answerOf(points, features, pair);
+             } },
+           { "lines", [=](const RoomPair& pair) {
+              return answerOf(lines, features, pair);
+            } } };
+}
+
+double errorOf(const Answer& answer, const Correspondences& truth)
+{
+  double sum = 0.0;
+  for (const Correspondence& match : truth)
+  {
+    sum += answer.f ? std::sqrt(sampsonError(*answer.f, match)) : std::numeric_limits<double>::quiet_NaN();
+  }
+  return sum / static_cast<double>(truth.size());
+}
+
+struct Summary
+{
+  int pairs = 0;
+  int answers = 0;
+  int right = 0;
+  int wrong = 0;
+  std::vector<double> errors;  ///< of right ones [px]
+  std::vector<double> ms;
+};
+
+}  // namespace
+
+void runRoomsExperiment(const ExperimentContext& context, std::ostream& csv)
+{
+  std::vector<Method> methods = ours();
+  for (Method& peer : peers())
+  {
+    methods.push_back(std::move(peer));
+  }
+  std::vector<RoomPair> pairs = allPairs(context.data);
+  if (context.brief)
+  {
+    pairs.resize(2);
+  }
+  std::map<std::pair<std::string, std::string>, Summary> summaries;  // of set and method
+  csv << "set,pair,baseline_m,rotation_deg,method,answer,error_px,inliers,ms\n";
+  for (const RoomPair& pair : pairs)
+  {
+    std::vector<Answer> answers;
+    std::vector<double> times;
+    for (const Method& method : methods)
+    {
+      const std::clock_t begin = std::clock();
+      answers.push_back(method.second(pair));
+      times.push_back(1e3 * static_cast<double>(std::clock() - begin) / CLOCKS_PER_SEC);
+    }
+    const Correspondences truth = pair.truth(answers);
+    std::cerr << pair.set << ' ' << pair.name << ':';
+    for (std::size_t i = 0; i < methods.size(); ++i)
+    {
+      const std::string& name = methods[i].first;
+      const double error = errorOf(answers[i], truth);
+      csv << pair.set << ',' << pair.name << ',' << pair.baseline << ',' << pair.rotation << ',' << name << ','
+          << (answers[i].f ? 1 : 0) << ',' << error << ',' << answers[i].inliers.size() << ',' << times[i] << '\n';
+      std::cerr << ' ' << name << ' ' << error << " px (" << answers[i].inliers.size() << ')';
+      Summary& summary = summaries[{ pair.set, name }];
+      summary.pairs += 1;
+      summary.answers += answers[i].f ? 1 : 0;
+      summary.right += error < RIGHT ? 1 : 0;
+      summary.wrong += error > WRONG ? 1 : 0;
+      if (error < RIGHT)
+      {
+        summary.errors.push_back(error);
+      }
+      summary.ms.push_back(times[i]);
+    }
+    std::cerr << std::endl;
+  }
+  for (const auto& [key, summary] : summaries)
+  {
+    std::cout << key.first << ", " << key.second << ": of " << summary.pairs << " pairs " << summary.answers
+              << " answered, " << summary.right << " right, " << summary.wrong << " grossly wrong";
+    if (!summary.errors.empty())
+    {
+      std::cout << "; right ones " << median(summary.errors) << " px in the median";
+    }
+    std::cout << "; " << median(summary.ms) << " ms of processor time" << std::endl;
+  }
+}
+
+}  // namespace view_servo
