@@ -97,7 +97,9 @@ struct WalkPair
     Correspondences matches;
     for (int i = 0; i < ROWS * COLUMNS; ++i)
     {
-      const Eigen::Vector2d at((i % COLUMNS + 0.5) * size.width / COLUMNS, (i / COLUMNS + 0.5) * size.height / ROWS);
+      const int row = i / COLUMNS;
+      const int column = i % COLUMNS;
+      const Eigen::Vector2d at((column + 0.5) * size.width / COLUMNS, (row + 0.5) * size.height / ROWS);
       for (const double depth : depths)
       {
         const Eigen::Vector3d point = current_from_reference * (depth * (camera.k.inverse() * at.homogeneous()));

@@ -199,6 +199,7 @@ std::optional<Eigen::Matrix3d> RegionRefiner::solve(const std::vector<SeenBlock>
 {
   constexpr double WIDTH = 3.0;  // of the weights, in median deviations
   std::vector<double> deviations;
+  deviations.reserve(seen.size());
   for (const SeenBlock& block : seen)
   {
     deviations.push_back(block.deviation);
