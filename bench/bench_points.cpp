@@ -12,6 +12,7 @@
  *   means a corner error under 5 px.
  * - time: medians of a whole match, and of one against a stored reference, as ratios to SIFT's.
  */
+#include "experiments/peer_matches.h"
 #include "view_servo/parameters/parameter.h"
 #include "view_servo/views/point_view_matcher.h"
 
@@ -128,28 +129,8 @@ Answer runPeer(const cv::Ptr<cv::Feature2D>& detector, const cv::Ptr<cv::Descrip
                const Problem& problem)
 {
   const auto start = std::chrono::steady_clock::now();
-  std::vector<cv::KeyPoint> reference_points;
-  std::vector<cv::KeyPoint> current_points;
-  cv::Mat reference_descriptors;
-  cv::Mat current_descriptors;
-  detector->detectAndCompute(problem.reference, cv::noArray(), reference_points, reference_descriptors);
-  detector->detectAndCompute(problem.current, cv::noArray(), current_points, current_descriptors);
+  const auto [from, to] = matchesOfPeer(detector, matcher, problem.reference, problem.current);
   Answer answer;
-  std::vector<cv::Point2f> from;
-  std::vector<cv::Point2f> to;
-  if (reference_points.size() >= 2 && current_points.size() >= 2)
-  {
-    std::vector<std::vector<cv::DMatch>> matches;
-    matcher->knnMatch(reference_descriptors, current_descriptors, matches, 2);
-    for (const std::vector<cv::DMatch>& best : matches)
-    {
-      if (best.size() == 2 && best[0].distance < 0.8F * best[1].distance)
-      {
-        from.push_back(reference_points[static_cast<std::size_t>(best[0].queryIdx)].pt);
-        to.push_back(current_points[static_cast<std::size_t>(best[0].trainIdx)].pt);
-      }
-    }
-  }
   cv::Mat h;
   std::vector<unsigned char> mask;
   if (from.size() >= 4)

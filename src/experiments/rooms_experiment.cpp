@@ -3,6 +3,7 @@
 #include "experiments/rooms_experiment.h"
 
 #include "experiments/indoor_walk.h"
+#include "experiments/peer_matches.h"
 #include "experiments/point_pairs.h"
 #include "experiments/statistics.h"
 #include "view_servo/geometry/fundamental.h"
@@ -225,29 +226,8 @@ using Method = std::pair<std::string, std::function<Answer(const RoomPair&)>>;
 Answer answerOfPeer(const cv::Ptr<cv::Feature2D>& detector, const cv::Ptr<cv::DescriptorMatcher>& matcher,
                     const RoomPair& pair)
 {
-  constexpr float RATIO = 0.8F;
   constexpr std::size_t ENOUGH = 15;
-  std::vector<cv::KeyPoint> reference_points;
-  std::vector<cv::KeyPoint> current_points;
-  cv::Mat reference_descriptors;
-  cv::Mat current_descriptors;
-  detector->detectAndCompute(pair.reference, cv::noArray(), reference_points, reference_descriptors);
-  detector->detectAndCompute(pair.current, cv::noArray(), current_points, current_descriptors);
-  std::vector<cv::Point2f> from;
-  std::vector<cv::Point2f> to;
-  if (reference_points.size() >= 2 && current_points.size() >= 2)
-  {
-    std::vector<std::vector<cv::DMatch>> matches;
-    matcher->knnMatch(reference_descriptors, current_descriptors, matches, 2);
-    for (const std::vector<cv::DMatch>& best : matches)
-    {
-      if (best.size() == 2 && best[0].distance < RATIO * best[1].distance)
-      {
-        from.push_back(reference_points[static_cast<std::size_t>(best[0].queryIdx)].pt);
-        to.push_back(current_points[static_cast<std::size_t>(best[0].trainIdx)].pt);
-      }
-    }
-  }
+  const auto [from, to] = matchesOfPeer(detector, matcher, pair.reference, pair.current);
   if (from.size() < ENOUGH)
   {
     return {};
