@@ -520,7 +520,9 @@ TEST_F(RecordBag, RefusesFilesThatCannotBeWritten)
   expectBadInput({ nomad_, "way", path("none/out.bag") }, path("none/out.bag"));
   std::filesystem::create_directory(path("folder"));
   expectBadInput({ nomad_, "way", path("folder") }, path("folder"));
+#ifndef __SANITIZE_THREAD__  // whose own memory is a file
   expectBadInput({ nomad_, "way", out_, "--rate", "50" }, out_, "trap \"\" XFSZ; ulimit -f 400");  // as on a full disk
+#endif
 }
 
 TEST_F(RecordBag, SparesAnOldBagWhenItFails)
