@@ -2,6 +2,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "view_servo/robust/significance.h"
 
+#include <algorithm>
 #include <cmath>
 
 namespace view_servo
@@ -26,6 +27,20 @@ double logSignificance(std::size_t candidates, std::size_t inliers, int sample_s
   const double log_false_alarms = std::log10(n - sample_size) + log10Choose(n, k) + log10Choose(k, sample_size) +
                                   (k - sample_size) * std::log10(probability);
   return -log_false_alarms;
+}
+
+double logBinomialTail(std::size_t count, std::size_t successes, double probability)
+{
+  constexpr double LEAST = 1e-9;
+  const double n = static_cast<double>(count);
+  const double p = std::max(probability, LEAST);
+  const double share = static_cast<double>(successes) / std::max(1.0, n);
+  if (share <= p)
+  {
+    return 0.0;
+  }
+  const double rest = share < 1.0 ? (1.0 - share) * std::log10((1.0 - share) / (1.0 - p)) : 0.0;
+  return -n * (share * std::log10(share / p) + rest);
 }
 
 }  // namespace view_servo

@@ -3,7 +3,7 @@
 #include "view_servo/views/line_view_matcher.h"
 
 #include "support/corner_error.h"
-
+#include "support/room_corner.h"
 #include "support/synthetic_scene.h"
 #include "support/textured_plane.h"
 #include "view_servo/geometry/fundamental.h"
@@ -29,18 +29,12 @@ namespace
 
 const cv::Size SIZE(640, 480);
 
+using test::RoomCorner;
+using test::warped;
+
 LineFeatures features(const cv::Mat& image, const LineMatcherParams& params)
 {
   return { image, detectLineSegments(image, params.segments), params.features };
-}
-
-cv::Mat warped(const cv::Mat& image, const Eigen::Matrix3d& h)
-{
-  cv::Mat matrix;
-  cv::eigen2cv(h, matrix);
-  cv::Mat result;
-  cv::warpPerspective(image, result, matrix, image.size(), cv::INTER_CUBIC, cv::BORDER_CONSTANT, cv::Scalar(110));
-  return result;
 }
 
 ViewMatch match(const cv::Mat& reference, const cv::Mat& current, GeometryModel model = GeometryModel::HOMOGRAPHY,
@@ -57,47 +51,6 @@ int correct(const ViewMatch& result, const Eigen::Matrix3d& h)
     return mapped && compare(*mapped, line.current).distance < 2.0;
   }));
 }
-
-/** Two walls that meet in the upright line u = 320 of the reference, each with its texture: a corner of a room. */
-struct RoomCorner
-{
-  cv::Mat reference;
-  cv::Mat current;
-  Eigen::Matrix3d left;   ///< homography of the left wall, reference -> current
-  Eigen::Matrix3d right;  ///< and of the right one
-  Eigen::Matrix3d f;
-
-  RoomCorner()
-  {
-    Eigen::Matrix3d k;
-    k << 500.0, 0.0, 319.5, 0.0, 500.0, 239.5, 0.0, 0.0, 1.0;
-    // Walls at 45 degrees to the optical axis that meet 4 m ahead.
-    const Eigen::Vector3d n_left(-std::sqrt(0.5), 0.0, std::sqrt(0.5));
-    const Eigen::Vector3d n_right(std::sqrt(0.5), 0.0, std::sqrt(0.5));
-    const double d = 4.0 * std::sqrt(0.5);
-    const Eigen::Matrix3d r = Eigen::AngleAxisd(0.15, Eigen::Vector3d::UnitY()).toRotationMatrix();
-    const Eigen::Vector3d t(-0.6, 0.1, 0.2);
-    left = k * (r + t * n_left.transpose() / d) * k.inverse();
-    right = k * (r + t * n_right.transpose() / d) * k.inverse();
-    Eigen::Matrix3d cross;
-    cross << 0.0, -t.z(), t.y(), t.z(), 0.0, -t.x(), -t.y(), t.x(), 0.0;
-    f = k.inverse().transpose() * cross * r * k.inverse();
-
-    const cv::Mat texture_left = test::texturedPicture(21, SIZE);
-    const cv::Mat texture_right = test::texturedPicture(22, SIZE);
-    reference = texture_left.clone();
-    const cv::Rect half(SIZE.width / 2, 0, SIZE.width / 2, SIZE.height);
-    texture_right(half).copyTo(reference(half));
-    cv::Mat mask(SIZE, CV_8UC1, cv::Scalar(0));
-    mask(half).setTo(255);
-    cv::Mat seen_mask;
-    cv::Mat matrix;
-    cv::eigen2cv(right, matrix);
-    cv::warpPerspective(mask, seen_mask, matrix, SIZE, cv::INTER_NEAREST);
-    current = warped(texture_left, left);
-    warped(texture_right, right).copyTo(current, seen_mask);
-  }
-};
 
 }  // namespace
 

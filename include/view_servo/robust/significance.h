@@ -14,6 +14,12 @@ namespace view_servo
 double logSignificance(std::size_t candidates, std::size_t inliers, int sample_size, double probability);
 
 /**
+ * log10 of (a bound, Chernoff's, on) the probability that of `count` events, each with `probability`, `successes` or more
+ * happen; 0 when so many are expected anyway. With events of different probabilities their mean may be given.
+ */
+double logBinomialTail(std::size_t count, std::size_t successes, double probability);
+
+/**
  * The share of wrong pairs, made of one inlier's reference position and another inlier's current position, that agree
  * with the model as well. It is large when the positions lie along one epipolar line, such as the edge of a floor:
  * these agree with whatever they are matched.

@@ -1,0 +1,53 @@
+// Copyright (c) 2026, the view_servo authors
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include "view_servo/geometry/correspondence.h"
+#include "view_servo/robust/random.h"
+
+#include <Eigen/Core>
+
+#include <optional>
+#include <vector>
+
+namespace view_servo
+{
+/**
+ * What matches away from a plane say of the epipolar geometry. Any F = [e]x H, with whatever epipole e, agrees with all
+ * matches on the plane of H, so only the others can tell whether an F is right (Chum, Werner & Matas 2005: "Two-view
+ * geometry estimation unaffected by a dominant plane").
+ */
+class Parallax
+{
+public:
+  /**
+   * @param plane homography, x_cur ~ H x_ref [px].
+   * @param pairs matches of all kinds, the most trustworthy first: the fewer wrong ones are before the right ones, the
+   * more the right ones mean.
+   * @param threshold a Sampson distance [px]: a pair agrees with an F that is nearer; one that lies nearer than twice as
+   * far to where the plane says is on the plane.
+   */
+  Parallax(const Eigen::Matrix3d& plane, const Correspondences& pairs, double threshold);
+
+  /**
+   * -log10 of the expected number of epipoles with which as many pairs off the plane agree, when the directions of their
+   * parallax are random (a-contrario, as logSignificance()): at 0 one such epipole is expected by chance.
+   */
+  double significance(const Eigen::Matrix3d& f) const;
+
+  /** Of the matrices [e]x H with an epipole from two pairs off the plane, the most significant of `samples` drawn. */
+  std::optional<Eigen::Matrix3d> findFundamental(int samples, Rng& rng) const;
+
+private:
+  struct Pair
+  {
+    Correspondence pair;
+    double chance;  ///< that a random direction of its parallax agrees
+  };
+
+  Eigen::Matrix3d plane_;
+  double threshold_;
+  std::vector<Pair> off_plane_;
+};
+
+}  // namespace view_servo

@@ -1,0 +1,102 @@
+// Copyright (c) 2026, the view_servo authors
+// SPDX-License-Identifier: BSD-3-Clause
+#include "view_servo/robust/parallax.h"
+
+#include "view_servo/geometry/fundamental.h"
+#include "view_servo/geometry/homography.h"
+#include "view_servo/robust/significance.h"
+
+#include <Eigen/Geometry>
+
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+#include <limits>
+
+namespace view_servo
+{
+namespace
+{
+constexpr std::size_t FIRST = 25;  // so many pairs, then twice as many and so on, are judged for themselves
+constexpr std::size_t SAMPLE = 2;  // determine the epipole
+constexpr std::size_t FEWEST = SAMPLE + 1;
+
+}  // namespace
+
+Parallax::Parallax(const Eigen::Matrix3d& plane, const Correspondences& pairs, double threshold)
+  : plane_(plane), threshold_(threshold)
+{
+  for (const Correspondence& pair : pairs)
+  {
+    const double distance = (transfer(plane, pair.reference) - pair.current).norm();
+    if (distance >= 2.0 * threshold)
+    {
+      // A Sampson distance is shared by both images: in the current one alone it may be larger by the root of two.
+      off_plane_.push_back({ pair, 2.0 / M_PI * std::asin(std::sqrt(2.0) * threshold / distance) });
+    }
+  }
+}
+
+double Parallax::significance(const Eigen::Matrix3d& f) const
+{
+  double best = -std::numeric_limits<double>::infinity();
+  double tests = 0.0;
+  std::size_t agreeing = 0;
+  double chances = 0.0;
+  std::size_t next = FIRST;
+  for (std::size_t i = 0; i < off_plane_.size(); ++i)
+  {
+    chances += off_plane_[i].chance;
+    agreeing += sampsonError(f, off_plane_[i].pair) < threshold_ * threshold_ ? 1 : 0;
+    const std::size_t count = i + 1;
+    if (count < FEWEST || (count != next && count != off_plane_.size()))
+    {
+      continue;
+    }
+    next *= 2;
+    tests += 1.0;
+    const double n = static_cast<double>(count);
+    const double epipoles = n * (n - 1.0) / 2.0;
+    const std::size_t others = agreeing - std::min(agreeing, SAMPLE);
+    best = std::max(best, -logBinomialTail(count - SAMPLE, others, chances / n) - std::log10(epipoles));
+  }
+  return best - std::log10(std::max(1.0, tests));
+}
+
+std::optional<Eigen::Matrix3d> Parallax::findFundamental(int samples, Rng& rng) const
+{
+  if (off_plane_.size() < FEWEST)
+  {
+    return std::nullopt;
+  }
+  // On which the epipole lies: through where the plane would be seen, and where the point is seen.
+  const auto line = [&](const Correspondence& pair) -> Eigen::Vector3d {
+    return (plane_ * pair.reference.homogeneous()).normalized().cross(pair.current.homogeneous().normalized());
+  };
+  std::optional<Eigen::Matrix3d> best;
+  double best_significance = -std::numeric_limits<double>::infinity();
+  for (int i = 0; i < samples; ++i)
+  {
+    // Two of three samples are of the more trustworthy pairs.
+    const std::size_t among = i % 3 == 0 ? off_plane_.size() : std::min(off_plane_.size(), 4 * FIRST);
+    const Correspondence& first = off_plane_[uniformIndex(rng, among)].pair;
+    const Correspondence& second = off_plane_[uniformIndex(rng, among)].pair;
+    const Eigen::Vector3d epipole = line(first).cross(line(second));
+    Eigen::Matrix3d cross;
+    cross << 0.0, -epipole.z(), epipole.y(), epipole.z(), 0.0, -epipole.x(), -epipole.y(), epipole.x(), 0.0;
+    const Eigen::Matrix3d f = (cross * plane_).normalized();
+    if (!(f.norm() > 0.5))  // the same pair twice, or lines that coincide
+    {
+      continue;
+    }
+    const double found = significance(f);
+    if (found > best_significance)
+    {
+      best_significance = found;
+      best = f;
+    }
+  }
+  return best;
+}
+
+}  // namespace view_servo

@@ -1,0 +1,121 @@
+// Copyright (c) 2026, the view_servo authors
+// SPDX-License-Identifier: BSD-3-Clause
+#include "view_servo/robust/parallax.h"
+
+#include "support/synthetic_scene.h"
+#include "view_servo/geometry/fundamental.h"
+#include "view_servo/robust/orientation.h"
+#include "view_servo/robust/significance.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+namespace view_servo
+{
+namespace
+{
+constexpr double THRESHOLD = 2.0;  // [px]
+
+/** Pairs on the plane of a scene, pairs off it, and wrong ones. */
+struct PlaneScene
+{
+  test::Scene scene;
+  Correspondences pairs;
+
+  PlaneScene(int off_plane, int wrong, std::uint64_t seed)
+  {
+    Rng rng(seed);
+    test::SceneOptions options;
+    options.inliers = 300;
+    options.noise = 0.3;
+    options.planar = true;
+    options.shuffle = false;
+    scene = test::makeScene(options, rng);
+    pairs = scene.pairs;
+    for (int i = 0; i < off_plane + wrong; ++i)
+    {
+      const Eigen::Vector2d reference = test::randomPixel(rng);
+      const Eigen::Vector3d x = uniform(rng, 2.5, 7.0) * (scene.k.inverse() * reference.homogeneous());
+      const Eigen::Vector2d seen = (scene.k * (scene.r * x + scene.t)).hnormalized();
+      pairs.push_back({ reference, i < off_plane ? seen : test::randomPixel(rng) });
+    }
+  }
+};
+
+double meanError(const Eigen::Matrix3d& f, const Correspondences& pairs, std::size_t begin, std::size_t end)
+{
+  double sum = 0.0;
+  for (std::size_t i = begin; i < end; ++i)
+  {
+    sum += std::sqrt(sampsonError(f, pairs[i]));
+  }
+  return sum / static_cast<double>(end - begin);
+}
+
+}  // namespace
+
+TEST(Parallax, FindsTheEpipoleThatAPlaneLeavesOpen)
+{
+  for (std::uint64_t seed = 1; seed <= 10; ++seed)
+  {
+    const PlaneScene plane(25, 50, seed);
+    const Parallax parallax(plane.scene.homography, plane.pairs, THRESHOLD);
+    Rng rng(seed);
+    const auto f = parallax.findFundamental(1500, rng);
+    ASSERT_TRUE(f);
+    EXPECT_GT(parallax.significance(*f), 5.0) << seed;
+    EXPECT_LT(meanError(*f, plane.pairs, 0, 300), 1.5) << seed;
+    EXPECT_LT(meanError(*f, plane.pairs, 300, 325), 3.0) << seed;
+    EXPECT_GT(parallax.significance(plane.scene.fundamental), 5.0) << seed;
+  }
+}
+
+TEST(Parallax, IsNotSignificantByChance)
+{
+  // Nothing but the plane and wrong pairs: the best of all epipoles is one of chance.
+  for (std::uint64_t seed = 1; seed <= 20; ++seed)
+  {
+    const PlaneScene plane(0, 150, seed);
+    const Parallax parallax(plane.scene.homography, plane.pairs, THRESHOLD);
+    Rng rng(seed);
+    const auto f = parallax.findFundamental(1500, rng);
+    ASSERT_TRUE(f);
+    EXPECT_LT(parallax.significance(*f), 1.0) << seed;
+  }
+}
+
+TEST(Parallax, OfAPlaneAloneIsNone)
+{
+  const PlaneScene plane(0, 0, 3);
+  const Parallax parallax(plane.scene.homography, plane.pairs, THRESHOLD);
+  Rng rng(1);
+  EXPECT_FALSE(parallax.findFundamental(100, rng));
+  EXPECT_LT(parallax.significance(plane.scene.fundamental), 0.0);
+}
+
+TEST(BinomialTail, BoundsTheTrueProbability)
+{
+  // P(5 or more of 10 at 0.1) = 0.0016349, of 10 of 10 = 1e-10.
+  EXPECT_GE(logBinomialTail(10, 5, 0.1), std::log10(0.0016349));
+  EXPECT_LT(logBinomialTail(10, 5, 0.1), -2.0);
+  EXPECT_NEAR(logBinomialTail(10, 10, 0.1), -10.0, 1e-9);
+  EXPECT_EQ(logBinomialTail(10, 1, 0.1), 0.0);
+  EXPECT_EQ(logBinomialTail(0, 0, 0.1), 0.0);
+}
+
+TEST(Orientation, IsKeptByAViewAndLostInAMirror)
+{
+  Rng rng(4);
+  test::SceneOptions options;
+  options.planar = true;
+  test::Scene scene = test::makeScene(options, rng);
+  EXPECT_TRUE(keepsOrientation(scene.pairs));
+  for (Correspondence& pair : scene.pairs)
+  {
+    pair.current.x() = test::IMAGE_WIDTH - pair.current.x();
+  }
+  EXPECT_FALSE(keepsOrientation(scene.pairs));
+}
+
+}  // namespace view_servo

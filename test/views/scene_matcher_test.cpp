@@ -1,0 +1,127 @@
+// Copyright (c) 2026, the view_servo authors
+// SPDX-License-Identifier: BSD-3-Clause
+#include "view_servo/views/scene_matcher.h"
+
+#include "support/corner_error.h"
+#include "support/room_corner.h"
+#include "support/textured_plane.h"
+#include "view_servo/geometry/fundamental.h"
+#include "view_servo/geometry/homography.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <stdexcept>
+
+namespace view_servo
+{
+namespace
+{
+ViewMatch match(const cv::Mat& reference, const cv::Mat& current)
+{
+  const SceneMatcher matcher{ SceneMatcherParams() };
+  const FeatureParams features = matcher.features();
+  return matcher.match(PreparedImage(reference, cv::Rect(), features), PreparedImage(current, cv::Rect(), features));
+}
+
+cv::Mat mirrored(const cv::Mat& image)
+{
+  cv::Mat result;
+  cv::flip(image, result, 1);
+  return result;
+}
+
+}  // namespace
+
+TEST(SceneMatcher, FindsTheFundamentalMatrixOfARoomCorner)
+{
+  const test::RoomCorner room;
+  const ViewMatch result = match(room.reference, room.current);
+  ASSERT_EQ(result.outcome, MatchOutcome::MATCHED) << result.message;
+  ASSERT_EQ(result.model, GeometryModel::FUNDAMENTAL) << result.message;
+  double worst = 0.0;
+  for (double u = 40.0; u < 640.0; u += 80.0)
+  {
+    for (double v = 40.0; v < 480.0; v += 80.0)
+    {
+      const Eigen::Vector2d at(u, v);
+      const Eigen::Vector2d seen = transfer(u < 320.0 ? room.left : room.right, at);
+      worst = std::max(worst, std::sqrt(sampsonError(result.matrix, { at, seen })));
+    }
+  }
+  EXPECT_LT(worst, 1.0);
+  EXPECT_GE(result.planes.size(), 2U);
+  EXPECT_GT(result.inliers, 200);
+  EXPECT_GT(result.log_significance, 100.0);
+  const auto inliers = std::count_if(result.matches.begin(), result.matches.end(),
+                                     [](const MatchedPoint& point) { return point.inlier; });
+  EXPECT_EQ(inliers, result.inliers);
+  EXPECT_FALSE(result.lines.empty());
+  for (const MatchedLine& line : result.lines)
+  {
+    EXPECT_GE(line.plane, 0);
+    EXPECT_LT(line.plane, static_cast<int>(result.planes.size()));
+  }
+}
+
+TEST(SceneMatcher, SaysThatAPlaneIsOne)
+{
+  const Eigen::Matrix3d h = test::exampleHomography();
+  const cv::Mat reference = test::texturedPicture(5, test::PICTURE_SIZE);
+  const ViewMatch result = match(reference, test::warped(reference, h));
+  ASSERT_EQ(result.outcome, MatchOutcome::MATCHED) << result.message;
+  EXPECT_EQ(result.model, GeometryModel::HOMOGRAPHY) << result.message;
+  EXPECT_LT(test::cornerError(result.matrix, h, test::PICTURE_SIZE), 0.5);
+}
+
+TEST(SceneMatcher, FindsNothingInUnrelatedPictures)
+{
+  for (int seed = 1; seed <= 5; ++seed)
+  {
+    const ViewMatch result =
+        match(test::texturedPicture(seed, test::PICTURE_SIZE), test::texturedPicture(seed + 50, test::PICTURE_SIZE));
+    EXPECT_EQ(result.outcome, MatchOutcome::NO_GEOMETRY) << seed << ": " << result.message;
+    EXPECT_TRUE(result.matrix.hasNaN());
+  }
+}
+
+TEST(SceneMatcher, FindsNothingInMirrors)
+{
+  const test::RoomCorner room;
+  const ViewMatch plane = match(room.reference, mirrored(room.reference));
+  EXPECT_NE(plane.outcome, MatchOutcome::MATCHED) << plane.message;
+  const ViewMatch corner = match(room.reference, mirrored(room.current));
+  EXPECT_NE(corner.outcome, MatchOutcome::MATCHED) << corner.message;
+}
+
+TEST(SceneMatcher, SaysWhenNothingIsThere)
+{
+  const cv::Mat grey(240, 320, CV_8UC1, cv::Scalar(128));
+  const ViewMatch result = match(grey, grey);
+  EXPECT_EQ(result.outcome, MatchOutcome::TOO_FEW_FEATURES);
+  EXPECT_NE(result.message.find("too few corners"), std::string::npos) << result.message;
+  EXPECT_NE(result.message.find("too few line segments"), std::string::npos) << result.message;
+}
+
+TEST(SceneMatcher, GivesTheSameAgain)
+{
+  const test::RoomCorner room;
+  const ViewMatch first = match(room.reference, room.current);
+  const ViewMatch second = match(room.reference, room.current);
+  EXPECT_EQ(first.matrix, second.matrix);
+  EXPECT_EQ(first.inliers, second.inliers);
+}
+
+TEST(SceneMatcher, NamesEveryFaultOfItsParameters)
+{
+  SceneMatcherParams params;
+  params.inlier_threshold = 0.0;
+  params.plane_correlation = 1.5;
+  params.points.min_log_significance = -1.0;
+  params.lines.min_quality = 2.0;
+  EXPECT_EQ(params.validate().size(), 4U);
+  EXPECT_THROW(SceneMatcher{ params }, std::invalid_argument);
+}
+
+}  // namespace view_servo
