@@ -10,6 +10,7 @@
 #include "view_servo/views/overlay.h"
 #include "view_servo/views/point_view_matcher.h"
 #include "view_servo/views/prepared_image.h"
+#include "view_servo/views/scene_matcher.h"
 #include "view_servo/views/segment_io.h"
 
 #include <Eigen/Geometry>
@@ -19,6 +20,7 @@
 #include <opencv2/core/utils/logger.hpp>
 #include <opencv2/imgcodecs.hpp>
 
+#include <algorithm>
 #include <chrono>
 #include <fstream>
 #include <iostream>
@@ -32,7 +34,7 @@
 #include <vector>
 
 /** @file
- * `match_images points|lines REF CUR`: matches two image files from the command line. Exit status: 0 a geometry was
+ * `match_images points|lines|scene REF CUR`: matches two image files from the command line. Exit status: 0 a geometry was
  * found, 1 none was found, 2 bad input, with one line on standard error that names the file or option.
  */
 namespace
@@ -57,6 +59,24 @@ const std::map<std::string, GeometryModel> MODELS{ { "homography", GeometryModel
                                                    { "fundamental", GeometryModel::FUNDAMENTAL } };
 const std::map<std::string, LineGrouping> GROUPS{ { "triplets", LineGrouping::TRIPLETS },
                                                   { "pairs", LineGrouping::PAIRS } };
+
+std::string nameOf(GeometryModel model)
+{
+  const auto known =
+      std::find_if(MODELS.begin(), MODELS.end(), [=](const auto& entry) { return entry.second == model; });
+  return known->first;
+}
+
+/** By what the images are matched. */
+enum class Subcommand
+{
+  POINTS,
+  LINES,
+  SCENE
+};
+const std::map<std::string, Subcommand> SUBCOMMANDS{ { "points", Subcommand::POINTS },
+                                                     { "lines", Subcommand::LINES },
+                                                     { "scene", Subcommand::SCENE } };
 
 struct Options
 {
@@ -214,13 +234,23 @@ nlohmann::json toJson(const std::vector<MatchedLine>& lines)
   return json;
 }
 
-/** What points and lines have in common. Numbers that are not finite become null. */
-nlohmann::json toJson(const ViewMatch& match, const std::string& model, const std::optional<double>& corner_error)
+nlohmann::json toJson(const std::vector<Eigen::Matrix3d>& matrices)
+{
+  nlohmann::json json = nlohmann::json::array();
+  for (const Eigen::Matrix3d& matrix : matrices)
+  {
+    json.push_back(toJson(matrix));
+  }
+  return json;
+}
+
+/** What all kinds of matches have in common. Numbers that are not finite become null. */
+nlohmann::json toJson(const ViewMatch& match, const std::optional<double>& corner_error)
 {
   nlohmann::json json;
   json["success"] = match.outcome == MatchOutcome::MATCHED;
   json["message"] = match.message;
-  json["model"] = model;
+  json["model"] = nameOf(match.model);
   json["matrix"] = toJson(match.matrix);
   json["inliers"] = match.inliers;
   json["rms_error"] = match.rms_error;
@@ -241,7 +271,7 @@ void printText(const ViewMatch& match, const Options& options, const std::option
   std::cout << match.message << '\n';
   if (match.outcome == MatchOutcome::MATCHED)
   {
-    std::cout << options.model << " (reference -> current):\n" << match.matrix << '\n';
+    std::cout << nameOf(match.model) << " (reference -> current):\n" << match.matrix << '\n';
     std::cout << "rms error of the inliers: " << match.rms_error << " px\n";
   }
   if (corner_error)
@@ -292,7 +322,7 @@ public:
     }
     if (options_.json)
     {
-      nlohmann::json json = toJson(match, options_.model, corner_error);
+      nlohmann::json json = toJson(match, corner_error);
       json.update(more);
       std::cout << json << '\n';
     }
@@ -358,16 +388,24 @@ ExitStatus matchLines(const Options& options)
                       { { "segments", segments_ms }, { "neighbours", prepared_ms - segments_ms } });
   match.elapsed_ms += prepared_ms;
 
-  nlohmann::json planes = nlohmann::json::array();
-  for (const Eigen::Matrix3d& plane : match.planes)
-  {
-    planes.push_back(toJson(plane));
-  }
   return report.write(match, reference, current,
                       { { "matches", toJson(match.lines) },
                         { "points", toJson(match.matches) },
-                        { "planes", planes },
+                        { "planes", toJson(match.planes) },
                         { "fundamental", toJson(match.fundamental) } });
+}
+
+ExitStatus matchScene(const Options& options)
+{
+  const auto matcher = makeMatcher<SceneMatcher, SceneMatcherParams>(options.settings);
+  const Report report(options);
+  const FeatureParams features = matcher.features();
+  const PreparedImage reference(readImage(options.reference), cv::Rect(), features);
+  const PreparedImage current(readImage(options.current), cv::Rect(), features);
+  const ViewMatch match = matcher.match(reference, current);
+  return report.write(
+      match, reference, current,
+      { { "matches", toJson(match.matches) }, { "lines", toJson(match.lines) }, { "planes", toJson(match.planes) } });
 }
 
 template <typename Params>
@@ -397,22 +435,34 @@ std::vector<std::string> namesOf(const Map& map)
 }
 
 /** Reads what follows the name of a subcommand; nothing when help was asked for. */
-std::optional<Options> readOptions(bool by_lines, int argc, const char* const* argv)
+std::optional<Options> readOptions(Subcommand subcommand, int argc, const char* const* argv)
 {
+  static const std::map<Subcommand, std::string> ABOUT{
+    { Subcommand::POINTS,
+      "match_images points REF CUR [OPTIONS]: matches two images by the intensity profiles between "
+      "corners." },
+    { Subcommand::LINES,
+      "match_images lines REF CUR [OPTIONS]: matches two images by the structure of groups of line "
+      "segments." },
+    { Subcommand::SCENE,
+      "match_images scene REF CUR [OPTIONS]: matches two images of a scene with depth by corners and "
+      "line segments together. The answer is a fundamental matrix or, where all lies on one plane, "
+      "a homography." }
+  };
   Options options;
-  CommandLine line(by_lines ? "match_images lines REF CUR [OPTIONS]: matches two images by the structure of groups of "
-                              "line segments.\nREF is the stored view, CUR what the camera sees now."
-                            : "match_images points REF CUR [OPTIONS]: matches two images by the intensity profiles "
-                              "between corners.\nREF is the stored view, CUR what the camera sees now.",
-                   STATUSES);
-  line.choice("model", options.model, namesOf(MODELS), "homography: the scene is a plane; fundamental: it has depth");
+  CommandLine line(ABOUT.at(subcommand) + "\nREF is the stored view, CUR what the camera sees now.", STATUSES);
+  if (subcommand != Subcommand::SCENE)
+  {
+    line.choice("model", options.model, namesOf(MODELS), "homography: the scene is a plane; fundamental: it has depth");
+    line.text("truth", options.truth,
+              "File with the true homography; prints the mean error at the reference's corners");
+  }
   line.text("overlay", options.overlay, "Write a picture of the matches to this file");
   line.flag("json", options.json, "Print the result as one JSON object");
   line.number("threads", options.threads, { 0.0, 1024.0 }, "Threads to use; 0: one a core");
   line.list("set", options.settings,
             "name=value: another value for a parameter; more may follow. See match_images --list-parameters");
-  line.text("truth", options.truth, "File with the true homography; prints the mean error at the reference's corners");
-  if (by_lines)
+  if (subcommand == Subcommand::LINES)
   {
     line.choice("groups", options.groups, namesOf(GROUPS), "Groups of segments that vote: three lines or two");
     line.text("segments-ref", options.reference_segments,
@@ -449,6 +499,7 @@ ExitStatus runWithoutImages(int argc, const char* const* argv)
       "Matches two images of a scene, over wide changes of viewpoint:\n"
       "  match_images points REF CUR [OPTIONS]   by the intensity profiles between corners\n"
       "  match_images lines REF CUR [OPTIONS]    by the structure of groups of line segments\n"
+      "  match_images scene REF CUR [OPTIONS]    by both together, for scenes with depth\n"
       "  match_images points --help              says which options there are",
       STATUSES);
   line.flag("list-parameters", list_parameters, "Print the names that --set knows, and end");
@@ -459,7 +510,7 @@ ExitStatus runWithoutImages(int argc, const char* const* argv)
   }
   if (!words->empty())
   {
-    throw BadInput("'" + words->front() + "' is unknown: match_images points REF CUR, or lines, is known");
+    throw BadInput("'" + words->front() + "' is unknown: match_images points REF CUR, or lines, or scene, is known");
   }
   if (!list_parameters)
   {
@@ -467,18 +518,18 @@ ExitStatus runWithoutImages(int argc, const char* const* argv)
   }
   listParameters<PointViewMatcherParams>("points");
   listParameters<LineMatcherParams>("lines");
+  listParameters<SceneMatcherParams>("scene");
   return FOUND;
 }
 
 ExitStatus run(int argc, const char* const* argv)
 {
-  const std::string subcommand = argc > 1 ? argv[1] : "";
-  if (subcommand != "points" && subcommand != "lines")
+  const auto subcommand = SUBCOMMANDS.find(argc > 1 ? argv[1] : "");
+  if (subcommand == SUBCOMMANDS.end())
   {
     return runWithoutImages(argc, argv);
   }
-  const bool by_lines = subcommand == "lines";
-  const std::optional<Options> options = readOptions(by_lines, argc - 1, argv + 1);
+  const std::optional<Options> options = readOptions(subcommand->second, argc - 1, argv + 1);
   if (!options)
   {
     return FOUND;  // --help
@@ -487,7 +538,16 @@ ExitStatus run(int argc, const char* const* argv)
   {
     cv::setNumThreads(options->threads);
   }
-  return by_lines ? matchLines(*options) : matchPoints(*options);
+  switch (subcommand->second)
+  {
+    case Subcommand::LINES:
+      return matchLines(*options);
+    case Subcommand::SCENE:
+      return matchScene(*options);
+    case Subcommand::POINTS:
+      break;
+  }
+  return matchPoints(*options);
 }
 
 }  // namespace

@@ -256,6 +256,25 @@ TEST_F(MatchImages, FindsAFundamentalMatrix)
   EXPECT_NEAR(squares, 1.0, 1e-9);
 }
 
+TEST_F(MatchImages, MatchesAScene)
+{
+  // All is on one plane here, and it says so.
+  const Outcome outcome = run({ "scene", reference_, current_, "--json", "--overlay", path("scene.png") });
+  EXPECT_EQ(outcome.status, 0) << outcome.err;
+  const json result = json::parse(outcome.out);
+  EXPECT_EQ(result.at("success"), true);
+  EXPECT_EQ(result.at("model"), "homography") << result.at("message");
+  EXPECT_EQ(result.at("matrix").size(), 9U);
+  EXPECT_GE(result.at("matches").size(), result.at("inliers").get<std::size_t>());
+  EXPECT_TRUE(result.at("lines").is_array());
+  EXPECT_TRUE(result.at("planes").is_array());
+  EXPECT_FALSE(cv::imread(path("scene.png")).empty());
+
+  EXPECT_EQ(run({ "scene", reference_, write("other.png", texture(9)) }).status, 1);
+  EXPECT_EQ(run({ "scene", reference_, current_, "--set", "scene_threshold=1.5" }).status, 0);
+  EXPECT_EQ(run({ "scene", reference_, current_, "--model", "homography" }).status, 2) << "it finds out by itself";
+}
+
 TEST_F(MatchImages, ComparesWithTheTruth)
 {
   cv::FileStorage storage(path("truth.xml"), cv::FileStorage::WRITE);
