@@ -11,6 +11,7 @@
 #include "view_servo/views/line_view_matcher.h"
 #include "view_servo/views/point_view_matcher.h"
 #include "view_servo/views/prepared_image.h"
+#include "view_servo/views/scene_matcher.h"
 
 #include <Eigen/LU>
 #include <Eigen/QR>
@@ -198,12 +199,12 @@ std::vector<RoomPair> allPairs(const fs::path& data)
 // ------------------------------------------------------------------------------------------------------ the methods
 
 /** Ours, with both pictures prepared anew. */
-template <typename Matcher>
-Answer answerOf(const Matcher& matcher, const FeatureParams& features, const RoomPair& pair)
+template <typename Match>
+Answer answerOf(const FeatureParams& features, const RoomPair& pair, const Match& match_images)
 {
   const PreparedImage reference(pair.reference, cv::Rect(), features);
   const PreparedImage current(pair.current, cv::Rect(), features);
-  const ViewMatch match = matcher.match(reference, current, GeometryModel::FUNDAMENTAL);
+  const ViewMatch match = match_images(reference, current);
   Answer answer;
   for (const MatchedPoint& point : match.matches)
   {
@@ -212,7 +213,7 @@ Answer answerOf(const Matcher& matcher, const FeatureParams& features, const Roo
       answer.inliers.push_back(point.position);
     }
   }
-  if (match.outcome == MatchOutcome::MATCHED)
+  if (match.outcome == MatchOutcome::MATCHED && match.model == GeometryModel::FUNDAMENTAL)
   {
     answer.f = match.matrix;
   }
@@ -274,18 +275,26 @@ std::vector<Method> peers()
 
 std::vector<Method> ours()
 {
-  const PointViewMatcher points{ PointViewMatcherParams() };
-  const LineViewMatcher lines{ LineMatcherParams() };
-  FeatureParams features;
-  features.points = points.params().points;
-  features.segments = lines.params().segments;
-  features.lines = lines.params().features;
-  return { { "points",
+  const SceneMatcher scene{ SceneMatcherParams() };
+  const PointViewMatcher points(scene.params().points);
+  const LineViewMatcher lines(scene.params().lines);
+  const FeatureParams features = scene.features();
+  return { { "points and lines",
              [=](const RoomPair& pair) {
-               return answerOf(points, features, pair);
+               return answerOf(features, pair, [&](const PreparedImage& reference, const PreparedImage& current) {
+                 return scene.match(reference, current);
+               });
+             } },
+           { "points",
+             [=](const RoomPair& pair) {
+               return answerOf(features, pair, [&](const PreparedImage& reference, const PreparedImage& current) {
+                 return points.match(reference, current, GeometryModel::FUNDAMENTAL);
+               });
              } },
            { "lines", [=](const RoomPair& pair) {
-              return answerOf(lines, features, pair);
+              return answerOf(features, pair, [&](const PreparedImage& reference, const PreparedImage& current) {
+                return lines.match(reference, current, GeometryModel::FUNDAMENTAL);
+              });
             } } };
 }
 
