@@ -276,9 +276,11 @@ std::vector<Method> peers()
 std::vector<Method> ours()
 {
   const SceneMatcher scene{ SceneMatcherParams() };
-  const PointViewMatcher points(scene.params().points);
+  const PointViewMatcher points{ PointViewMatcherParams() };
   const LineViewMatcher lines(scene.params().lines);
   const FeatureParams features = scene.features();
+  FeatureParams few_corners = features;
+  few_corners.points = points.params().points;
   return { { "points and lines",
              [=](const RoomPair& pair) {
                return answerOf(features, pair, [&](const PreparedImage& reference, const PreparedImage& current) {
@@ -287,7 +289,7 @@ std::vector<Method> ours()
              } },
            { "points",
              [=](const RoomPair& pair) {
-               return answerOf(features, pair, [&](const PreparedImage& reference, const PreparedImage& current) {
+               return answerOf(few_corners, pair, [&](const PreparedImage& reference, const PreparedImage& current) {
                  return points.match(reference, current, GeometryModel::FUNDAMENTAL);
                });
              } },

@@ -455,7 +455,14 @@ private:
   double margin_ = 0.0;        ///< of matrix_: how far it is above what is asked for; negative: not enough
 };
 
-std::vector<Parameter> rowsOfScene(SceneMatcherParams& params)
+}  // namespace
+
+SceneMatcherParams::SceneMatcherParams()
+{
+  points.points.corners.max_corners = 1000;  // of a whole room 500 are few
+}
+
+std::vector<Parameter> sceneParameters(SceneMatcherParams& params)
 {
   return {
     real("scene_threshold", params.inlier_threshold, "px", "> 0", "largest distance of a match from its epipolar line"),
@@ -467,16 +474,9 @@ std::vector<Parameter> rowsOfScene(SceneMatcherParams& params)
   };
 }
 
-}  // namespace
-
-SceneMatcherParams::SceneMatcherParams()
-{
-  points.points.corners.max_corners = 1000;  // of a whole room 500 are few
-}
-
 std::vector<Parameter> parameters(SceneMatcherParams& params)
 {
-  return joined({ parameters(params.points), rowsOfScene(params) });
+  return joined({ parameters(params.points), sceneParameters(params) });
 }
 
 std::vector<std::string> SceneMatcherParams::validate() const
@@ -485,7 +485,7 @@ std::vector<std::string> SceneMatcherParams::validate() const
   Faults faults;
   faults.add(points.validate());
   faults.add(lines.validate());
-  faults.add(faultsOf(rowsOfScene(copy)));
+  faults.add(faultsOf(sceneParameters(copy)));
   return faults.list();
 }
 

@@ -12,6 +12,7 @@
 #include "view_servo/ros/streaming_matcher.h"
 #include "view_servo/views/line_view_matcher.h"
 #include "view_servo/views/point_view_matcher.h"
+#include "view_servo/views/scene_matcher.h"
 
 #include <gtest/gtest.h>
 #include <yaml-cpp/yaml.h>
@@ -36,6 +37,7 @@ public:
   StreamingMatcherParams lines_node;
   PointViewMatcherParams points;
   LineMatcherParams lines;
+  SceneMatcherParams scene;
   HomingDriverParams homing;
   HomographyTrackerNodeParams tracker;
   ServoDriverParams servo;
@@ -71,7 +73,8 @@ public:
       { "parameters",
         { { "## Matchers", parameters(points_node) },
           { "## Points", parameters(points) },
-          { "## Lines", parameters(lines) } } },
+          { "## Lines", parameters(lines) },
+          { "## Scenes", sceneParameters(scene) } } },
       { "parameters_of_drivers",
         { { "## Homing", parameters(homing) },
           { "## Homography tracker", parameters(tracker) },

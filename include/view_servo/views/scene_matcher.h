@@ -22,7 +22,7 @@ struct SceneMatcherParams
   double inlier_threshold = 2.0;      ///< largest Sampson distance of a match that agrees [px]
   double plane_correlation = 0.75;    ///< least correlation of a corner's patch, warped by the homography of a plane
   double min_log_significance = 6.0;  ///< least -log10 of the false alarms of a fundamental matrix
-  double min_log_parallax = 5.0;      ///< least Parallax::significance() of a fundamental matrix
+  double min_log_parallax = 3.0;      ///< least Parallax::significance() of a fundamental matrix
   std::uint64_t seed = 1;             ///< fixes all random draws of this stage
 
   SceneMatcherParams();
@@ -31,7 +31,10 @@ struct SceneMatcherParams
   std::vector<std::string> validate() const;
 };
 
-/** Names, units and ranges of the parameters of points and of this stage; those of lines keep their own table. */
+/** Names, units and ranges of the parameters of this stage alone, by which validate() checks them. */
+std::vector<Parameter> sceneParameters(SceneMatcherParams& params);
+
+/** The same with those of points; the names of lines would be there twice. */
 std::vector<Parameter> parameters(SceneMatcherParams& params);
 
 /**
