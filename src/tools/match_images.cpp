@@ -427,6 +427,7 @@ template <typename Map>
 std::vector<std::string> namesOf(const Map& map)
 {
   std::vector<std::string> names;
+  names.reserve(map.size());
   for (const auto& [name, value] : map)
   {
     names.push_back(name);
@@ -437,7 +438,7 @@ std::vector<std::string> namesOf(const Map& map)
 /** Reads what follows the name of a subcommand; nothing when help was asked for. */
 std::optional<Options> readOptions(Subcommand subcommand, int argc, const char* const* argv)
 {
-  static const std::map<Subcommand, std::string> ABOUT{
+  const std::map<Subcommand, std::string> about{
     { Subcommand::POINTS,
       "match_images points REF CUR [OPTIONS]: matches two images by the intensity profiles between "
       "corners." },
@@ -450,7 +451,7 @@ std::optional<Options> readOptions(Subcommand subcommand, int argc, const char* 
       "a homography." }
   };
   Options options;
-  CommandLine line(ABOUT.at(subcommand) + "\nREF is the stored view, CUR what the camera sees now.", STATUSES);
+  CommandLine line(about.at(subcommand) + "\nREF is the stored view, CUR what the camera sees now.", STATUSES);
   if (subcommand != Subcommand::SCENE)
   {
     line.choice("model", options.model, namesOf(MODELS), "homography: the scene is a plane; fundamental: it has depth");
