@@ -406,9 +406,8 @@ private:
       const double held = parallax.significance(choice);
       const double significance = significanceOf(choice);
       // A plane that is beyond doubt and what its parallax says determine a fundamental matrix as well as all matches do.
-      const double margin =
-          std::min(held - params_.min_log_parallax,
-                   std::max(significance, isBeyondDoubt(&plane) ? held : 0.0) - params_.min_log_significance);
+      const double evidence = isBeyondDoubt(&plane) ? std::max(significance, held) : significance;
+      const double margin = std::min(held - params_.min_log_parallax, evidence - params_.min_log_significance);
       // Of those that hold, the one with which most matches agree.
       const std::size_t support = agreeing(choice).size();
       const bool better = margin >= 0.0 && margin_ >= 0.0 ? support > support_ : margin > margin_;
@@ -416,7 +415,7 @@ private:
       {
         matrix_ = choice;
         support_ = support;
-        significance_ = significance;
+        significance_ = evidence;
         margin_ = margin;
       }
     }

@@ -14,7 +14,7 @@
 
 namespace view_servo
 {
-/** Which geometry relates two images; PointViewMatcher and LineViewMatcher estimate either. */
+/** Which geometry relates two images; each of the matchers estimates either. */
 enum class GeometryModel
 {
   HOMOGRAPHY,  ///< x_cur ~ H x_ref, for planes
@@ -28,7 +28,7 @@ enum class MatchOutcome
   NO_GEOMETRY
 };
 
-/** A candidate match of two points: corners (PointViewMatcher) or intersections of lines (LineViewMatcher). */
+/** A candidate match of two points: corners (PointViewMatcher), line intersections (LineViewMatcher), both (SceneMatcher). */
 struct MatchedPoint
 {
   Correspondence position;  ///< pixels of the full images
@@ -57,7 +57,7 @@ struct StageTime
   double ms;
 };
 
-/** The result of matching a stored view (`reference`) with a live image (`current`), by points or by lines. */
+/** The result of matching a stored view (`reference`) with a live image (`current`), by points, lines or both. */
 struct ViewMatch
 {
   MatchOutcome outcome = MatchOutcome::NO_GEOMETRY;
@@ -71,14 +71,14 @@ struct ViewMatch
   std::vector<StageTime> stages;  ///< in the order of their ends
   double elapsed_ms = 0.0;        ///< of the whole match [ms]
 
-  /** @name Set by PointViewMatcher only; zero otherwise.
+  /** @name Set by PointViewMatcher only; zero otherwise. SceneMatcher sets the first for a fundamental matrix.
    * @{ */
   double log_significance = 0.0;  ///< -log10 of the expected number of geometries this good among chance matches
   int reference_level = 0;        ///< level of the reference PreparedImage at which the geometry was found
   int current_level = 0;          ///< the same of the current one
   /** @} */
 
-  /** @name Set by LineViewMatcher only; empty and NaN otherwise.
+  /** @name Set by LineViewMatcher and SceneMatcher; empty and NaN otherwise.
    * @{ */
   std::vector<MatchedLine> lines;       ///< best first
   std::vector<Eigen::Matrix3d> planes;  ///< homographies x_cur ~ H x_ref of planes, most lines first
