@@ -28,7 +28,7 @@ enum class MatchOutcome
   NO_GEOMETRY
 };
 
-/** A candidate match of two points: corners (PointViewMatcher), intersections (LineViewMatcher), both (SceneMatcher). */
+/** A candidate match of two points: corners (PointViewMatcher), intersections (LineViewMatcher), or both. */
 struct MatchedPoint
 {
   Correspondence position;  ///< pixels of the full images
