@@ -157,9 +157,10 @@ public:
     return toProgress(report_);
   }
 
+  /** The base stands already at the first image whose stamp is apart from odometry's. */
   Velocity wanted(double /*time*/) const
   {
-    return base_in_odom_ ? along(course_, *base_in_odom_) : Velocity(Velocity::Zero());
+    return base_in_odom_ && odd_stamps_ == 0 ? along(course_, *base_in_odom_) : Velocity(Velocity::Zero());
   }
 
   static void sent(double /*time*/, const Velocity& /*velocity*/)
