@@ -7,6 +7,7 @@
 #include "view_servo/SaveView.h"
 #include "view_servo/ServoStatus.h"
 #include "view_servo/SetPose.h"
+#include "view_servo/ros/call_service.h"
 #include "view_servo/ros/conversions.h"
 #include "view_servo/ros/node_base.h"
 #include "view_servo/ros/parameters.h"
@@ -15,7 +16,6 @@
 #include <actionlib/client/simple_action_client.h>
 #include <geometry_msgs/PoseStamped.h>
 #include <ros/package.h>
-#include <ros/service.h>
 #include <ros/spinner.h>
 #include <ros/subscriber.h>
 #include <sensor_msgs/Image.h>
@@ -243,7 +243,7 @@ private:
     const std::shared_ptr<Call> shared = std::make_shared<Call>();
     shared->service = service;
     std::thread([shared, resolved] {
-      guarded("calling " + resolved, [&] { shared->was_answered = ros::service::call(resolved, shared->service); });
+      guarded("calling " + resolved, [&] { shared->was_answered = callService(resolved, shared->service); });
       shared->has_ended = true;
     }).detach();
     const std::string missing = waitUntilReady(params_.patience, [&]() -> std::string {

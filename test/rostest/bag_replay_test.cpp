@@ -11,6 +11,7 @@
 #include "view_servo/PointMatches.h"
 #include "view_servo/SetView.h"
 #include "view_servo/geometry/homography.h"
+#include "view_servo/ros/call_service.h"
 #include "view_servo/views/view_store.h"
 
 #include <geometry_msgs/PoseStamped.h>
@@ -118,7 +119,7 @@ protected:
       SetView::Request request;
       request.view = view;
       SetView::Response response;
-      ASSERT_TRUE(ros::service::call(std::string(node) + "/set_view", request, response));
+      ASSERT_TRUE(callService(std::string(node) + "/set_view", request, response));
       ASSERT_TRUE(response.success) << response.message;
     }
   }

@@ -9,6 +9,7 @@
 
 #include "view_servo/ServoStatus.h"
 #include "view_servo/WantedView.h"
+#include "view_servo/ros/call_service.h"
 #include "view_servo/views/view_store.h"
 
 #include <actionlib/client/simple_action_client.h>
@@ -200,7 +201,7 @@ protected:
   {
     std_srvs::SetBool service;
     service.request.data = on ? 1 : 0;
-    ASSERT_TRUE(ros::service::call(enableService(), service));
+    ASSERT_TRUE(callService(enableService(), service));
     EXPECT_TRUE(service.response.success) << service.response.message;
   }
 
@@ -302,7 +303,7 @@ protected:
       ASSERT_TRUE(waitForService(service)) << node.output();
       std_srvs::SetBool enable;
       enable.request.data = 1;
-      ASSERT_TRUE(ros::service::call(service, enable));
+      ASSERT_TRUE(callService(service, enable));
       ASSERT_TRUE(waitUntil([this] { return client.isServerConnected(); }));
       Goal goal;
       goal.view = view;

@@ -13,6 +13,7 @@
 #include "view_servo/Heading.h"
 #include "view_servo/SetView.h"
 #include "view_servo/geometry/planar_pose.h"
+#include "view_servo/ros/call_service.h"
 #include "view_servo/views/view_store.h"
 
 #include <gtest/gtest.h>
@@ -62,7 +63,7 @@ TEST_P(HomingReplayTest, HeadingsAndArrivalAgreeWithTheTruth)
   ASSERT_TRUE(waitForService("point_matcher/set_view"));
   SetView set;
   set.request.view = "goal";
-  ASSERT_TRUE(ros::service::call("point_matcher/set_view", set) && set.response.success) << set.response.message;
+  ASSERT_TRUE(callService("point_matcher/set_view", set) && set.response.success) << set.response.message;
 
   std::map<ros::Time, PlanarPose> truth;  // of the goal as seen from the camera
   for (const Frame& frame : framesOf(bag))

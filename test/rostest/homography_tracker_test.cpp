@@ -9,6 +9,7 @@
 #include "view_servo/SetView.h"
 #include "view_servo/WantedView.h"
 #include "view_servo/geometry/camera_warp.h"
+#include "view_servo/ros/call_service.h"
 #include "view_servo/ros/conversions.h"
 #include "view_servo/views/view_store.h"
 
@@ -143,7 +144,7 @@ protected:
     for (const std::string node : { "homography_tracker", "lost" })
     {
       std_srvs::Trigger service;
-      EXPECT_TRUE(ros::service::call(node + "/stop", service));
+      EXPECT_TRUE(callService(node + "/stop", service));
       EXPECT_TRUE(service.response.success);
     }
   }
@@ -161,7 +162,7 @@ protected:
   {
     SetView service;
     service.request.view = view;
-    EXPECT_TRUE(ros::service::call(node + "/start", service));
+    EXPECT_TRUE(callService(node + "/start", service));
     return service.response;
   }
 
@@ -292,7 +293,7 @@ TEST_F(HomographyAlignerTest, StopsWhenTold)
 {
   follow(exampleHomography());
   std_srvs::Trigger service;
-  ASSERT_TRUE(ros::service::call("homography_tracker/stop", service));
+  ASSERT_TRUE(callService("homography_tracker/stop", service));
   const Recorder<sensor_msgs::CameraInfo> images("camera/camera_info");
   ASSERT_TRUE(waitUntil([&] { return images.messages().size() > 3; }));
   const ros::Time then = images.last()->header.stamp;

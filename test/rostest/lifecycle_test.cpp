@@ -11,6 +11,7 @@
 #include "view_servo/PointMatches.h"
 #include "view_servo/SaveView.h"
 #include "view_servo/SetView.h"
+#include "view_servo/ros/call_service.h"
 
 #include <gtest/gtest.h>
 
@@ -67,7 +68,7 @@ protected:
     SetView::Request request;
     request.view = "wall";
     SetView::Response response;
-    ASSERT_TRUE(ros::service::call(name + "/set_view", request, response));
+    ASSERT_TRUE(callService(name + "/set_view", request, response));
     ASSERT_TRUE(response.success) << response.message;
 
     const FakeCamera camera("camera");
@@ -98,7 +99,7 @@ TEST_F(LifecycleTest, ViewsSurviveARestart)
     request.name = "wall";
     request.source.image = toMono8(picture);
     SaveView::Response response;
-    ASSERT_TRUE(ros::service::call("view_store_one/save", request, response));
+    ASSERT_TRUE(callService("view_store_one/save", request, response));
     EXPECT_TRUE(response.success) << response.message;
     node.interrupt();
     EXPECT_EQ(node.exitStatus(), 0) << node.output();
@@ -108,7 +109,7 @@ TEST_F(LifecycleTest, ViewsSurviveARestart)
   ASSERT_TRUE(waitForService("view_store_two/list")) << node.output();
   ListViews::Request list_request;
   ListViews::Response listing;
-  ASSERT_TRUE(ros::service::call("view_store_two/list", list_request, listing));
+  ASSERT_TRUE(callService("view_store_two/list", list_request, listing));
   EXPECT_EQ(listing.names, std::vector<std::string>{ "wall" });
 
   ChildProcess matcher({ POINT_MATCHER, "__name:=matcher", views() }, directory_.path() / "matcher_output");
@@ -117,7 +118,7 @@ TEST_F(LifecycleTest, ViewsSurviveARestart)
   request.reference.view = "wall";
   request.query.image = toMono8(warped(picture, exampleHomography()));
   MatchPoints::Response response;
-  ASSERT_TRUE(ros::service::call("matcher/match", request, response));
+  ASSERT_TRUE(callService("matcher/match", request, response));
   EXPECT_TRUE(response.success) << response.message;
   EXPECT_LT(cornerError(toMatrix(response.model_matrix), exampleHomography()), 1.5);
 }
@@ -135,7 +136,7 @@ TEST_F(LifecycleTest, KeepsViewsInRosHomeByDefault)
   request.name = "wall";
   request.source.image = toMono8(texturedPicture(1));
   SaveView::Response response;
-  ASSERT_TRUE(ros::service::call("view_store_home/save", request, response));
+  ASSERT_TRUE(callService("view_store_home/save", request, response));
   EXPECT_TRUE(response.success) << response.message;
   EXPECT_TRUE(std::filesystem::exists(directory_.path() / "view_servo" / "views" / "wall.yaml"));
 }

@@ -6,6 +6,7 @@
 #include "view_servo/LineMatches.h"
 #include "view_servo/MatchLines.h"
 #include "view_servo/SetView.h"
+#include "view_servo/ros/call_service.h"
 #include "view_servo/views/view_store.h"
 
 #include <gtest/gtest.h>
@@ -87,7 +88,7 @@ protected:
   static MatchLines::Response call(MatchLines::Request request)
   {
     MatchLines::Response response;
-    EXPECT_TRUE(ros::service::call(MATCH, request, response)) << "the node did not answer";
+    EXPECT_TRUE(callService(MATCH, request, response)) << "the node did not answer";
     return response;
   }
 
@@ -96,7 +97,7 @@ protected:
     SetView::Request request;
     request.view = view;
     SetView::Response response;
-    EXPECT_TRUE(ros::service::call(SET_VIEW, request, response)) << "the node did not answer";
+    EXPECT_TRUE(callService(SET_VIEW, request, response)) << "the node did not answer";
     return response;
   }
 

@@ -4,6 +4,7 @@
 #include "support/temporary_directory.h"
 
 #include "view_servo/MatchPoints.h"
+#include "view_servo/ros/call_service.h"
 #include "view_servo/views/view_store.h"
 
 #include <gtest/gtest.h>
@@ -74,7 +75,7 @@ protected:
   {
     MatchPoints::Request copy = request;
     MatchPoints::Response response;
-    EXPECT_TRUE(ros::service::call(service, copy, response)) << "the node did not answer";
+    EXPECT_TRUE(callService(service, copy, response)) << "the node did not answer";
     return response;
   }
 

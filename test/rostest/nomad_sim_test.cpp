@@ -5,6 +5,7 @@
 #include "test_paths.h"
 #include "view_servo/SetLight.h"
 #include "view_servo/SetPose.h"
+#include "view_servo/ros/call_service.h"
 
 #include <geometry_msgs/PoseStamped.h>
 #include <geometry_msgs/Twist.h>
@@ -51,7 +52,7 @@ protected:
     ASSERT_TRUE(waitUntil([&] { return command_.getNumSubscribers() > 0; }));
     SetPose place;
     place.request.pose = toPose(planarPose(-0.906, 0.423, 0.0));
-    ASSERT_TRUE(ros::service::call("nomad_sim/set_pose", place) && place.response.success) << place.response.message;
+    ASSERT_TRUE(callService("nomad_sim/set_pose", place) && place.response.success) << place.response.message;
     ASSERT_TRUE(waitUntil([&] { return speed() == 0.0; }));
     waitForFreshTruth();
   }
@@ -166,14 +167,14 @@ TEST_F(NomadSim, RefusesPosesInsideFurniture)
   const Eigen::Isometry3d before = cameraByTruth();
   SetPose place;
   place.request.pose = toPose(planarPose(2.2, 0.0, 0.0));
-  ASSERT_TRUE(ros::service::call("nomad_sim/set_pose", place));
+  ASSERT_TRUE(callService("nomad_sim/set_pose", place));
   EXPECT_FALSE(place.response.success);
   EXPECT_NE(place.response.message.find("table"), std::string::npos) << place.response.message;
   place.request.pose.orientation.w = 0.0;
-  ASSERT_TRUE(ros::service::call("nomad_sim/set_pose", place));
+  ASSERT_TRUE(callService("nomad_sim/set_pose", place));
   EXPECT_FALSE(place.response.success);
   place.request.pose = toPose(planarPose(std::numeric_limits<double>::infinity(), 0.0, 0.0));
-  ASSERT_TRUE(ros::service::call("nomad_sim/set_pose", place));
+  ASSERT_TRUE(callService("nomad_sim/set_pose", place));
   EXPECT_FALSE(place.response.success);
   waitForFreshTruth();
   EXPECT_TRUE(cameraByTruth().isApprox(before, 1e-12));
@@ -188,17 +189,17 @@ TEST_F(NomadSim, LightIsSet)
   SetLight light;
   light.request.gain = 0.6;
   light.request.offset = 5.0;
-  ASSERT_TRUE(ros::service::call("nomad_sim/set_light", light) && light.response.success) << light.response.message;
+  ASSERT_TRUE(callService("nomad_sim/set_light", light) && light.response.success) << light.response.message;
   EXPECT_TRUE(waitUntil([&] { return std::abs(mean() - (0.6 * before + 5.0)) < 1.0; })) << before << " " << mean();
   for (const double gain : { 0.0, -1.0, std::numeric_limits<double>::quiet_NaN() })
   {
     light.request.gain = gain;
-    ASSERT_TRUE(ros::service::call("nomad_sim/set_light", light));
+    ASSERT_TRUE(callService("nomad_sim/set_light", light));
     EXPECT_FALSE(light.response.success);
   }
   light.request.gain = 1.0;
   light.request.offset = 0.0;
-  ASSERT_TRUE(ros::service::call("nomad_sim/set_light", light) && light.response.success);
+  ASSERT_TRUE(callService("nomad_sim/set_light", light) && light.response.success);
   EXPECT_TRUE(waitUntil([&] { return std::abs(mean() - before) < 1.0; }));
 }
 

@@ -4,6 +4,7 @@
 
 #include "view_servo/HomeToViewAction.h"
 #include "view_servo/ServoToViewAction.h"
+#include "view_servo/ros/call_service.h"
 
 #include <nav_msgs/Odometry.h>
 #include <rosgraph_msgs/Clock.h>
@@ -52,7 +53,7 @@ protected:
       ASSERT_TRUE(waitUntil([this] { return client.isServerConnected(); }));
       std_srvs::SetBool enable;
       enable.request.data = 1;
-      ASSERT_TRUE(ros::service::call(enable_service, enable));
+      ASSERT_TRUE(callService(enable_service, enable));
       typename Action::_action_goal_type::_goal_type goal;
       goal.view = "goal";
       goal.timeout = timeout;

@@ -4,6 +4,7 @@
 #include "sim_ros/robot_messages.h"
 #include "test_paths.h"
 #include "view_servo/SetPose.h"
+#include "view_servo/ros/call_service.h"
 
 #include <geometry_msgs/PoseStamped.h>
 #include <geometry_msgs/TwistStamped.h>
@@ -172,13 +173,13 @@ TEST_F(PumaSim, GoesToPosesWithinReachOnly)
   near.translation().z() += 0.02;
   SetPose place;
   place.request.pose = toPose(near);
-  ASSERT_TRUE(ros::service::call("puma_sim/set_pose", place) && place.response.success) << place.response.message;
+  ASSERT_TRUE(callService("puma_sim/set_pose", place) && place.response.success) << place.response.message;
   waitForFreshTruth();
   EXPECT_TRUE(cameraByTruth().isApprox(near, 1e-5));
   Eigen::Isometry3d far = before;
   far.translation().x() += 5.0;
   place.request.pose = toPose(far);
-  ASSERT_TRUE(ros::service::call("puma_sim/set_pose", place));
+  ASSERT_TRUE(callService("puma_sim/set_pose", place));
   EXPECT_FALSE(place.response.success);
   waitForFreshTruth();
   EXPECT_TRUE(cameraByTruth().isApprox(near, 1e-5));

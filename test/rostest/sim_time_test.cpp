@@ -5,6 +5,7 @@
 #include "view_servo/MatchPoints.h"
 #include "view_servo/PointMatches.h"
 #include "view_servo/SetView.h"
+#include "view_servo/ros/call_service.h"
 #include "view_servo/views/view_store.h"
 
 #include <gtest/gtest.h>
@@ -55,7 +56,7 @@ protected:
     MatchPoints::Request request;
     request.reference.view = "wall";
     MatchPoints::Response response;
-    EXPECT_TRUE(ros::service::call("point_matcher/match", request, response));
+    EXPECT_TRUE(callService("point_matcher/match", request, response));
     return response;
   }
 
@@ -72,7 +73,7 @@ TEST_F(SimTimeTest, ServesBeforeTheClockStarts)
   request.reference.view = "wall";
   request.query.image = toMono8(seen_);
   MatchPoints::Response response;
-  ASSERT_TRUE(ros::service::call("point_matcher/match", request, response));
+  ASSERT_TRUE(callService("point_matcher/match", request, response));
   EXPECT_TRUE(response.success) << response.message;
 }
 
@@ -112,7 +113,7 @@ TEST_F(SimTimeTest, StreamsOnAfterTimeJumpsBack)
   SetView::Request request;
   request.view = "wall";
   SetView::Response response;
-  ASSERT_TRUE(ros::service::call("point_matcher/set_view", request, response));
+  ASSERT_TRUE(callService("point_matcher/set_view", request, response));
   const Recorder<PointMatches> matches("point_matcher/point_matches");
   double now = 2000.0;
   EXPECT_TRUE(waitUntil([&] { return matches.last() && matches.last()->header.stamp > ros::Time(2000.0); },

@@ -9,6 +9,7 @@
 #include "view_servo/SaveView.h"
 #include "view_servo/SetView.h"
 #include "view_servo/WantedView.h"
+#include "view_servo/ros/call_service.h"
 #include "view_servo/views/view_store.h"
 
 #include <diagnostic_msgs/DiagnosticArray.h>
@@ -90,7 +91,7 @@ protected:
     typename Service::Response call(const std::string& service, typename Service::Request request) const
     {
       typename Service::Response response;
-      EXPECT_TRUE(ros::service::call(name + "/" + service, request, response)) << service << " did not answer";
+      EXPECT_TRUE(callService(name + "/" + service, request, response)) << service << " did not answer";
       return response;
     }
 

@@ -7,6 +7,7 @@
 #include "view_servo/GetView.h"
 #include "view_servo/ListViews.h"
 #include "view_servo/SaveView.h"
+#include "view_servo/ros/call_service.h"
 #include "view_servo/views/view_store.h"
 
 #include <geometry_msgs/TransformStamped.h>
@@ -47,7 +48,7 @@ protected:
   static typename Service::Response call(const std::string& service, typename Service::Request request)
   {
     typename Service::Response response;
-    EXPECT_TRUE(ros::service::call("view_store/" + service, request, response)) << service << " did not answer";
+    EXPECT_TRUE(callService("view_store/" + service, request, response)) << service << " did not answer";
     return response;
   }
 
