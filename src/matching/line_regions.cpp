@@ -13,6 +13,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
+#include <iterator>
 #include <limits>
 #include <optional>
 #include <utility>
@@ -38,6 +39,28 @@ double support(const std::vector<SegmentMatch>& matches)
     sum += supportOf(match.share);
   }
   return sum;
+}
+
+/** Smallest and largest coordinates of what a region matches in the reference image [px]. */
+std::pair<Eigen::Array2d, Eigen::Array2d> extent(const LineRegion& region, const LineFeatures& reference)
+{
+  Eigen::Array2d low(std::numeric_limits<double>::infinity(), std::numeric_limits<double>::infinity());
+  Eigen::Array2d high = -low;
+  for (const SegmentMatch& match : region.matches)
+  {
+    const Segment& segment = reference.segment(match.reference);
+    for (const Eigen::Vector2d& end : { segment.start, segment.end })
+    {
+      low = low.min(end.array());
+      high = high.max(end.array());
+    }
+  }
+  return { low, high };
+}
+
+bool contains(const cv::Size& image, const Eigen::Vector2d& at)
+{
+  return at.x() > 0.0 && at.y() > 0.0 && at.x() < image.width - 1.0 && at.y() < image.height - 1.0;
 }
 
 class RegionFinder
@@ -394,16 +417,7 @@ private:
     constexpr double MIN_MARGIN = 30.0;  // [px]
     for (int round = 0; round < MAX_ROUNDS; ++round)
     {
-      Eigen::Array2d low(std::numeric_limits<double>::infinity(), std::numeric_limits<double>::infinity());
-      Eigen::Array2d high = -low;
-      for (const SegmentMatch& match : region.matches)
-      {
-        for (const Eigen::Vector2d& end : { reference(match.reference).start, reference(match.reference).end })
-        {
-          low = low.min(end.array());
-          high = high.max(end.array());
-        }
-      }
+      const auto [low, high] = extent(region, from_);
       const double margin = std::max(MIN_MARGIN, MARGIN * (high - low).maxCoeff());
       std::vector<int> around;
       for (int i = 0; i < static_cast<int>(from_.segments().size()); ++i)
@@ -513,6 +527,73 @@ std::optional<LineRegion> growLineRegion(const LineFeatures& reference, const Li
                                          const LineRegionParams& params)
 {
   return RegionFinder(reference, current, AssociationMatrix(), params).grown(h, matches);
+}
+
+LineEvidence& LineEvidence::operator+=(const LineEvidence& other)
+{
+  seen += other.seen;
+  found += other.found;
+  tried += other.tried;
+  beside += other.beside;
+  return *this;
+}
+
+std::array<LineEvidence, LINE_DIRECTIONS> evidenceOf(const LineRegion& region, const LineFeatures& reference,
+                                                     const LineFeatures& current, const std::vector<char>& others,
+                                                     const LineRegionParams& params)
+{
+  constexpr double ACROSS = 0.7;                    // sine of the least angle of a segment to the direction
+  constexpr double ASIDE[] = { 10.0, 17.0, 27.0 };  // [px]
+  const auto [low, high] = extent(region, reference);
+  const cv::Mat& image = current.smoothed();
+  std::vector<std::pair<int, Eigen::Vector2d>> seen;  // index, and direction in the current image
+  for (int i = 0; i < static_cast<int>(reference.segments().size()); ++i)
+  {
+    const Eigen::Array2d at = reference.segment(i).midpoint().array();
+    if (others[static_cast<std::size_t>(i)] != 0 || (at < low).any() || (at > high).any())
+    {
+      continue;
+    }
+    const auto mapped = transfer(region.h, reference.segment(i));
+    if (mapped && contains(image.size(), mapped->midpoint()))
+    {
+      seen.emplace_back(i, (mapped->end - mapped->start).normalized());
+    }
+  }
+  const auto countAt = [&](const std::vector<int>& of, const Eigen::Vector2d& aside) {
+    Eigen::Matrix3d shift = Eigen::Matrix3d::Identity();
+    shift.topRightCorner<2, 1>() = aside;
+    const Eigen::Matrix3d h = shift * region.h;
+    const std::vector<SegmentMatch> matches =
+        agreeingSegments(reference.segments(), of, current, h, params.tolerance, params.max_angle_deg);
+    return static_cast<std::size_t>(std::count_if(matches.begin(), matches.end(), [&](const SegmentMatch& match) {
+      return sideCorrelation(reference.smoothed(), current.smoothed(), h, reference.segment(match.reference),
+                             current.segment(match.current)) >= params.min_correlation;
+    }));
+  };
+  std::array<LineEvidence, LINE_DIRECTIONS> evidence;
+  for (std::size_t axis = 0; axis < evidence.size(); ++axis)
+  {
+    const double angle = static_cast<double>(axis) * M_PI / static_cast<double>(evidence.size());
+    const Eigen::Vector2d along(std::cos(angle), std::sin(angle));
+    std::vector<int> across;
+    for (const auto& [i, direction] : seen)
+    {
+      if (std::abs(cross(direction, along)) > ACROSS)
+      {
+        across.push_back(i);
+      }
+    }
+    LineEvidence& counts = evidence[axis];
+    counts.seen = across.size();
+    counts.found = countAt(across, Eigen::Vector2d::Zero());
+    for (const double distance : ASIDE)
+    {
+      counts.tried += 2 * across.size();
+      counts.beside += countAt(across, distance * along) + countAt(across, -distance * along);
+    }
+  }
+  return evidence;
 }
 
 }  // namespace view_servo

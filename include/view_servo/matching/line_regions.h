@@ -8,6 +8,8 @@
 
 #include <Eigen/Core>
 
+#include <array>
+#include <cstddef>
 #include <optional>
 #include <string>
 #include <vector>
@@ -73,5 +75,33 @@ std::vector<LineRegion> findLineRegions(const LineFeatures& reference, const Lin
 std::optional<LineRegion> growLineRegion(const LineFeatures& reference, const LineFeatures& current,
                                          const Eigen::Matrix3d& h, const std::vector<SegmentMatch>& matches,
                                          const LineRegionParams& params);
+
+constexpr std::size_t LINE_DIRECTIONS = 4;  ///< of the current image, 45 degrees apart, beginning with that of its rows
+
+/** How many segments that lie across one direction are found where a homography sends them, and how many beside. */
+struct LineEvidence
+{
+  std::size_t seen = 0;    ///< segments sent into the current image
+  std::size_t found = 0;   ///< of these, those for which a segment is there that looks alike
+  std::size_t tried = 0;   ///< segments sent a little aside, which is done in several ways
+  std::size_t beside = 0;  ///< of these, those for which a segment is there that looks alike
+
+  /** Of a segment to be found where it does not belong, as the rule of succession estimates it. */
+  double chance() const
+  {
+    return (static_cast<double>(beside) + 1.0) / (static_cast<double>(tried) + 2.0);
+  }
+  LineEvidence& operator+=(const LineEvidence& other);
+};
+
+/**
+ * What the segments between a region's matches say of its homography, for each of the directions: those segments count
+ * that lie across it, as only they show a shift along it. All reference
+ * segments within the box around the matches count, matched or not, but for those that `others` marks.
+ * @param others for each reference segment, whether another region has matched it.
+ */
+std::array<LineEvidence, LINE_DIRECTIONS> evidenceOf(const LineRegion& region, const LineFeatures& reference,
+                                                     const LineFeatures& current, const std::vector<char>& others,
+                                                     const LineRegionParams& params);
 
 }  // namespace view_servo
