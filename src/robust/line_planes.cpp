@@ -18,19 +18,6 @@ namespace
 {
 constexpr double HUBER_WIDTH = 0.5;  // of the final fits: residuals beyond count linearly [px]
 
-/** Whether nearly all of the points lie on one plane, which leaves F open. */
-bool isPlanar(const Correspondences& points, const LinePlanes& planes, double threshold)
-{
-  constexpr std::size_t MIN_OFF_PLANE = 6;
-  return std::any_of(planes.homographies.begin(), planes.homographies.end(), [&](const Eigen::Matrix3d& h) {
-    const Eigen::Matrix3d inverse = h.inverse();
-    const auto off = std::count_if(points.begin(), points.end(), [&](const Correspondence& point) {
-      return 0.5 * symmetricTransferError(h, inverse, point) > threshold * threshold;
-    });
-    return static_cast<std::size_t>(off) < std::max(MIN_OFF_PLANE, points.size() / 20);
-  });
-}
-
 }  // namespace
 
 std::vector<Parameter> parameters(LinePlaneParams& params)
@@ -93,11 +80,10 @@ bool liesOnPlane(const LinePlanes& planes, const Correspondence& point, double t
   });
 }
 
-std::optional<Eigen::Matrix3d> fundamentalOfPoints(const Correspondences& points, const LinePlanes& planes,
-                                                   const RansacParams& params, Rng& rng)
+std::optional<Eigen::Matrix3d> fundamentalOfPoints(const Correspondences& points, const RansacParams& params, Rng& rng)
 {
   constexpr std::size_t MIN_POINTS = 12;
-  if (points.size() < MIN_POINTS || isPlanar(points, planes, params.inlier_threshold))
+  if (points.size() < MIN_POINTS)
   {
     return std::nullopt;
   }

@@ -2,6 +2,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "view_servo/views/line_view_matcher.h"
 
+#include "repetition.h"
 #include "stage_clock.h"
 #include "view_servo/features/side_correlation.h"
 #include "view_servo/geometry/fundamental.h"
@@ -10,6 +11,8 @@
 #include "view_servo/parameters/faults.h"
 #include "view_servo/robust/fundamental_estimator.h"
 #include "view_servo/robust/line_homography_estimator.h"
+#include "view_servo/robust/parallax.h"
+#include "view_servo/robust/significance.h"
 
 #include <Eigen/Geometry>
 #include <Eigen/LU>
@@ -140,6 +143,43 @@ public:
       regions_.erase(std::remove_if(regions_.begin(), regions_.end(), disagrees), regions_.end());
     }
     return found.statistics;
+  }
+
+  /**
+   * -log10 of the probability that chance finds as many segments where all regions send them; of four directions, that
+   * along which shifts show least: regions of parallel lines leave the homography open however many there are.
+   */
+  double significance() const
+  {
+    constexpr int NONE = -1;
+    constexpr double LEAST_CHANCE = 0.005;
+    std::vector<int> of_reference(from_.segments().size(), NONE);
+    for (std::size_t i = 0; i < regions_.size(); ++i)
+    {
+      for (const SegmentMatch& match : regions_[i].matches)
+      {
+        of_reference[static_cast<std::size_t>(match.reference)] = static_cast<int>(i);
+      }
+    }
+    std::array<LineEvidence, LINE_DIRECTIONS> all;
+    for (std::size_t i = 0; i < regions_.size(); ++i)
+    {
+      std::vector<char> others(of_reference.size());
+      std::transform(of_reference.begin(), of_reference.end(), others.begin(),
+                     [&](int region) { return static_cast<char>(region != NONE && region != static_cast<int>(i)); });
+      const auto evidence = evidenceOf(regions_[i], from_, to_, others, params_.regions);
+      for (std::size_t axis = 0; axis < all.size(); ++axis)
+      {
+        all[axis] += evidence[axis];
+      }
+    }
+    double least = std::numeric_limits<double>::infinity();
+    for (const LineEvidence& evidence : all)
+    {
+      const double chance = std::max(LEAST_CHANCE, evidence.chance());
+      least = std::min(least, -logBinomialTail(evidence.seen, evidence.found, chance));
+    }
+    return least;
   }
 
   /** Intersections of neighbours that are matched in the same region, each once. */
@@ -371,9 +411,66 @@ void reportFundamental(ViewMatch& result)
                    plural(result.matches.size(), "intersection") + " agree with one fundamental matrix";
 }
 
+/** The fundamental matrix of the intersections, best first, or of two planes, if it stands without any of the planes. */
+std::optional<Eigen::Matrix3d> fundamentalOf(const Correspondences& points, const SegmentPairs& lines,
+                                             const LinePlanes& planes, const LineMatcherParams& params, Rng& rng)
+{
+  const auto stands = [&](const std::optional<Eigen::Matrix3d>& f) {
+    return f && std::all_of(planes.homographies.begin(), planes.homographies.end(), [&](const Eigen::Matrix3d& h) {
+             return Parallax(h, points, params.planes.threshold).significance(*f) >= params.min_log_parallax;
+           });
+  };
+  auto f = fundamentalOfPoints(points, params.ransac, rng);
+  if (!stands(f))
+  {
+    f = fundamentalOfPlanes(lines, planes);
+  }
+  return stands(f) ? f : std::nullopt;
+}
+
 constexpr std::size_t MIN_SEGMENTS = 6;
 
-std::string whyNot(const LineFeatures& reference, const LineFeatures& current, const ViewMatch& result)
+/** Where the lines of neighbouring segments meet within the image. */
+std::vector<Corner> meetingPlaces(const LineFeatures& features)
+{
+  constexpr std::size_t MOST = 1500;
+  std::vector<Corner> places;
+  places.reserve(MOST);
+  for (int i = 0; i < features.groupedCount() && places.size() < MOST; ++i)
+  {
+    for (const LineFeatures::Meeting& meeting : features.meetings(i))
+    {
+      if (meeting.other > i)
+      {
+        places.push_back({ meeting.at, 0.0F });
+      }
+    }
+  }
+  return places;
+}
+
+/** Whether the first plane has more than half of the lines, and they are found elsewhere nearly as well. */
+bool isRepeated(const LineFeatures& reference, const LineFeatures& current, const ViewMatch& result)
+{
+  const auto on_plane =
+      std::count_if(result.lines.begin(), result.lines.end(), [](const MatchedLine& line) { return line.plane == 0; });
+  if (2 * static_cast<std::size_t>(on_plane) <= result.lines.size())
+  {
+    return false;
+  }
+  const Eigen::Matrix3d& plane = result.planes.front();
+  const Eigen::Matrix3d inverse = plane.inverse();
+  constexpr double NEAR = 3.0;  // [px]
+  Correspondences pairs = positions(result.matches);
+  pairs.erase(std::remove_if(pairs.begin(), pairs.end(),
+                             [&](const Correspondence& pair) {
+                               return 0.5 * symmetricTransferError(plane, inverse, pair) > NEAR * NEAR;
+                             }),
+              pairs.end());
+  return otherPlace(reference.smoothed(), current.smoothed(), pairs, meetingPlaces(current), plane).has_value();
+}
+
+std::string whyNot(const LineFeatures& reference, const LineFeatures& current, const ViewMatch& result, bool by_chance)
 {
   if (result.outcome == MatchOutcome::TOO_FEW_FEATURES)
   {
@@ -385,6 +482,11 @@ std::string whyNot(const LineFeatures& reference, const LineFeatures& current, c
   {
     return "no geometry found: no part of the reference's segments falls on segments that look alike";
   }
+  if (by_chance)
+  {
+    return "no geometry found: " + plural(result.lines.size(), "line") +
+           " matched, hardly more than chance would match, or all in one direction";
+  }
   return "no geometry found: " + plural(result.lines.size(), "line") + " matched, which leave " +
          (result.model == GeometryModel::HOMOGRAPHY ? "the homographies of planes" : "the fundamental matrix") +
          " open";
@@ -395,6 +497,11 @@ std::vector<Parameter> rowsOfLines(LineMatcherParams& params)
 {
   return {
     real("min_quality", params.min_quality, "", "[0, 1)", "least mean of a match's overlap and correlation"),
+    real("min_significance", params.min_log_significance, "", ">= 0",
+         "-log10 of the probability that chance matches as many lines"),
+    boolean("unique", params.unique, "refuse a view that fits at another place nearly as well"),
+    real("min_parallax", params.min_log_parallax, "", ">= 0",
+         "-log10 of the false alarms a fundamental matrix may have off each plane"),
     natural("seed", params.seed, "of all random draws"),
   };
 }
@@ -474,6 +581,8 @@ ViewMatch LineViewMatcher::match(const LineFeatures& reference, const LineFeatur
   clock.finish("regions");
   result.ransac = attempt.dropInconsistentRegions();
   clock.finish("ransac");
+  result.log_significance = attempt.significance();
+  clock.finish("significance");
 
   SegmentPairs lines;
   const std::vector<SegmentMatch> matches = attempt.matches();
@@ -494,13 +603,11 @@ ViewMatch LineViewMatcher::match(const LineFeatures& reference, const LineFeatur
   clock.finish("planes");
 
   result.matches = attempt.junctions();
+  std::stable_sort(result.matches.begin(), result.matches.end(),
+                   [](const MatchedPoint& a, const MatchedPoint& b) { return a.score > b.score; });
   const Correspondences points = positions(result.matches);
   const double threshold = params_.ransac.inlier_threshold;
-  auto f = fundamentalOfPoints(points, planes, params_.ransac, attempt.rng());
-  if (!f)
-  {
-    f = fundamentalOfPlanes(lines, planes);
-  }
+  const std::optional<Eigen::Matrix3d> f = fundamentalOf(points, lines, planes, params_, attempt.rng());
   if (f)
   {
     result.fundamental = *f;
@@ -510,15 +617,16 @@ ViewMatch LineViewMatcher::match(const LineFeatures& reference, const LineFeatur
     point.inlier =
         f ? sampsonError(*f, point.position) <= threshold * threshold : liesOnPlane(planes, point.position, threshold);
   }
-  std::stable_sort(result.matches.begin(), result.matches.end(),
-                   [](const MatchedPoint& a, const MatchedPoint& b) { return a.score > b.score; });
   clock.finish("fundamental");
 
-  if (model == GeometryModel::HOMOGRAPHY && !planes.homographies.empty())
+  const bool by_chance = result.log_significance < params_.min_log_significance;
+  const bool repeated = params_.unique && !by_chance && isRepeated(reference, current, result);
+  clock.finish("unique");
+  if (model == GeometryModel::HOMOGRAPHY && !planes.homographies.empty() && !by_chance && !repeated)
   {
     reportPlane(lines, planes, result);
   }
-  else if (model == GeometryModel::FUNDAMENTAL && f)
+  else if (model == GeometryModel::FUNDAMENTAL && f && !by_chance && !repeated)
   {
     reportFundamental(result);
   }
@@ -526,7 +634,7 @@ ViewMatch LineViewMatcher::match(const LineFeatures& reference, const LineFeatur
   {
     const std::size_t fewest = std::min(reference.segments().size(), current.segments().size());
     result.outcome = fewest < MIN_SEGMENTS ? MatchOutcome::TOO_FEW_FEATURES : MatchOutcome::NO_GEOMETRY;
-    result.message = whyNot(reference, current, result);
+    result.message = repeated ? REPEATED : whyNot(reference, current, result, by_chance);
   }
   result.elapsed_ms = clock.total();
   return result;

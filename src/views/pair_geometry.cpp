@@ -9,11 +9,14 @@
 #include "view_servo/robust/fundamental_estimator.h"
 #include "view_servo/robust/homography_estimator.h"
 #include "view_servo/robust/multi_hypothesis.h"
+#include "view_servo/robust/parallax.h"
+#include "view_servo/robust/ransac.h"
 
 #include <Eigen/LU>
 
 #include <algorithm>
 #include <cmath>
+#include <iterator>
 #include <utility>
 
 namespace view_servo
@@ -111,6 +114,18 @@ public:
     return refineHomography(matrix, pairs, HUBER_WIDTH);
   }
 
+  std::optional<Eigen::Matrix3d> settle(const Eigen::Matrix3d& matrix, const Correspondences& /*candidates*/,
+                                        Rng& /*rng*/) const override
+  {
+    return matrix;
+  }
+
+  std::optional<Eigen::Matrix3d> mainPlane(const Eigen::Matrix3d& matrix, const Correspondences& /*agreeing*/,
+                                           Rng& /*rng*/) const override
+  {
+    return matrix;
+  }
+
   int sampleSize() const override
   {
     return HomographyEstimator::SAMPLE_SIZE;
@@ -196,6 +211,55 @@ public:
     return polishFundamental(matrix, pairs, HUBER_WIDTH);
   }
 
+  /** It has to stand without the plane on which most of those lie that agree with it. */
+  std::optional<Eigen::Matrix3d> settle(const Eigen::Matrix3d& matrix, const Correspondences& candidates,
+                                        Rng& rng) const override
+  {
+    constexpr int SAMPLES = 1500;
+    constexpr double SCALES[] = { 1.0, 0.5, 0.25 };  // of the threshold: exact matches show a small parallax, too
+    const double least = params_.min_log_parallax + std::log10(std::size(SCALES));
+    std::optional<Parallax> coarsest;
+    for (const double scale : SCALES)
+    {
+      const double tolerance = scale * threshold();
+      const auto plane = bestPlane(agreeing(matrix, candidates, tolerance), 2.0 * tolerance, rng);
+      if (!plane)
+      {
+        break;
+      }
+      const Parallax parallax(*plane, candidates, tolerance);
+      if (parallax.significance(matrix) >= least)
+      {
+        return matrix;
+      }
+      if (!coarsest)
+      {
+        coarsest = parallax;
+      }
+    }
+    const auto other = coarsest ? coarsest->findFundamental(SAMPLES, rng) : std::nullopt;
+    if (!other)
+    {
+      return std::nullopt;
+    }
+    const Eigen::Matrix3d refined = refine(*other, agreeing(*other, candidates, threshold()));
+    return coarsest->significance(refined) >= least ? std::optional<Eigen::Matrix3d>(refined) : std::nullopt;
+  }
+
+  std::optional<Eigen::Matrix3d> mainPlane(const Eigen::Matrix3d& /*matrix*/, const Correspondences& agreeing,
+                                           Rng& rng) const override
+  {
+    const auto plane = bestPlane(agreeing, threshold(), rng);
+    if (!plane)
+    {
+      return std::nullopt;
+    }
+    const auto on_plane = std::count_if(agreeing.begin(), agreeing.end(), [&](const Correspondence& pair) {
+      return (transfer(*plane, pair.reference) - pair.current).norm() <= threshold();
+    });
+    return 4 * static_cast<std::size_t>(on_plane) > agreeing.size() ? plane : std::nullopt;
+  }
+
   int sampleSize() const override
   {
     return FundamentalEstimator::SAMPLE_SIZE;
@@ -234,6 +298,26 @@ private:
   {
     const double diagonal = std::hypot(current.width, current.height);
     return 2.0 * threshold() * diagonal;
+  }
+
+  static Correspondences agreeing(const Eigen::Matrix3d& matrix, const Correspondences& pairs, double tolerance)
+  {
+    Correspondences found;
+    std::copy_if(pairs.begin(), pairs.end(), std::back_inserter(found),
+                 [&](const Correspondence& pair) { return sampsonError(matrix, pair) <= tolerance * tolerance; });
+    return found;
+  }
+
+  /** The homography that most of the pairs agree with. */
+  std::optional<Eigen::Matrix3d> bestPlane(const Correspondences& pairs, double tolerance, Rng& rng) const
+  {
+    constexpr int MAX_ITERATIONS = 1000;
+    RansacParams params = params_.ransac;
+    params.inlier_threshold = tolerance;
+    params.sampling = Sampling::UNIFORM;
+    params.max_iterations = std::min(params.max_iterations, MAX_ITERATIONS);
+    const auto found = ransac(HomographyEstimator(pairs), params, rng);
+    return found.model ? std::optional<Eigen::Matrix3d>(found.model->h) : std::nullopt;
   }
 
   /** Largest violation of the view constraint by a sample (thesis 6.3, method 2); 0: not tested. */

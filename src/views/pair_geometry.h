@@ -82,6 +82,17 @@ public:
   /** Least squares from `matrix`, robust against some outliers. */
   virtual Eigen::Matrix3d refine(const Eigen::Matrix3d& matrix, const Correspondences& pairs) const = 0;
 
+  /**
+   * The matrix, or one near it, that the candidates determine; empty when they leave it open, as those of one plane leave
+   * a fundamental matrix. @param candidates all pairs, right and wrong, the most trustworthy first.
+   */
+  virtual std::optional<Eigen::Matrix3d> settle(const Eigen::Matrix3d& matrix, const Correspondences& candidates,
+                                                Rng& rng) const = 0;
+
+  /** The homography of a plane on which more than a quarter of what agrees lies; empty if there is none. */
+  virtual std::optional<Eigen::Matrix3d> mainPlane(const Eigen::Matrix3d& matrix, const Correspondences& agreeing,
+                                                   Rng& rng) const = 0;
+
   virtual int sampleSize() const = 0;
 
   /** [px²] */

@@ -3,6 +3,7 @@
 #include "view_servo/views/point_view_matcher.h"
 
 #include "pair_geometry.h"
+#include "repetition.h"
 #include "stage_clock.h"
 #include "view_servo/parameters/faults.h"
 #include "view_servo/robust/orientation.h"
@@ -13,6 +14,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <iterator>
 #include <limits>
 #include <memory>
 #include <optional>
@@ -172,13 +174,34 @@ public:
       inliers_.clear();
       return false;
     }
-    matrix_ = geometry_.refine(fit->matrix, supporting);
+    const Eigen::Matrix3d refined = geometry_.refine(fit->matrix, supporting);
+    const std::optional<Eigen::Matrix3d> settled = geometry_.settle(refined, pairs, rng);
+    left_open_ = !settled;
+    if (left_open_)
+    {
+      inliers_.clear();
+      return false;
+    }
+    matrix_ = *settled;
+    if (matrix_ != refined)
+    {
+      keepAgreeing(candidates_);
+    }
+    pairs_ = std::move(pairs);
     return true;
   }
 
-  /** More matches along the geometry that was found, and a better geometry from them. */
-  void guide()
+  /** Whether there was a geometry, and the candidates do not determine it. */
+  bool leftOpen() const
   {
+    return left_open_;
+  }
+
+  /** More matches along the geometry that was found, and a better geometry from them. */
+  void guide(Rng& rng)
+  {
+    const Eigen::Matrix3d unguided = matrix_;
+    const std::vector<CornerMatch> of_candidates = inliers_;
     for (int round = 0; round < MAX_GUIDED_ROUNDS; ++round)
     {
       const std::vector<CornerMatch> found = geometry_.findAlong(matrix_, level_);
@@ -188,22 +211,33 @@ public:
         supporting.push_back(level_.correspondence(match));
       }
       const Eigen::Matrix3d refined = geometry_.refine(matrix_, supporting);
-      std::vector<CornerMatch> agreeing;
-      for (const CornerMatch& match : found)
-      {
-        if (geometry_.agrees(refined, level_.correspondence(match)))
-        {
-          agreeing.push_back(match);
-        }
-      }
-      const bool grown = agreeing.size() > inliers_.size() + inliers_.size() / 50;
+      const std::size_t before = inliers_.size();
       matrix_ = refined;
-      inliers_ = std::move(agreeing);
+      keepAgreeing(found);
+      const bool grown = inliers_.size() > before + before / 50;
       if (round > 0 && !grown)
       {
         break;
       }
     }
+    // What is sought along a geometry speaks for it, right or wrong: the candidates judge.
+    if (geometry_.settle(matrix_, pairs_, rng) != matrix_)
+    {
+      matrix_ = unguided;
+      inliers_ = of_candidates;
+    }
+  }
+
+  /** Whether what agrees with the geometry is found elsewhere nearly as well. */
+  bool isRepeated(Rng& rng) const
+  {
+    Correspondences pairs;
+    for (const CornerMatch& match : inliers_)
+    {
+      pairs.push_back(level_.correspondence(match));
+    }
+    const std::optional<Eigen::Matrix3d> plane = geometry_.mainPlane(matrix_, pairs, rng);
+    return plane && otherPlace(level_.reference_image, level_.current_image, pairs, to_.corners, *plane);
   }
 
   /** Writes what was found in the pixels of the full images: inliers, and the candidates of all other corners. */
@@ -252,6 +286,14 @@ public:
   }
 
 private:
+  /** Makes those inliers that agree with the geometry. */
+  void keepAgreeing(const std::vector<CornerMatch>& matches)
+  {
+    inliers_.clear();
+    std::copy_if(matches.begin(), matches.end(), std::back_inserter(inliers_),
+                 [&](const CornerMatch& match) { return geometry_.agrees(matrix_, level_.correspondence(match)); });
+  }
+
   const PreparedImage& reference_;
   const PreparedImage& current_;
   const LevelPair levels_;
@@ -264,7 +306,9 @@ private:
   std::vector<CornerMatch> candidates_;
   const LevelData level_;
   std::vector<CornerMatch> inliers_;
+  Correspondences pairs_;  ///< candidates_ of a geometry that was accepted
   Eigen::Matrix3d matrix_;
+  bool left_open_ = false;
 };
 
 }  // namespace
@@ -302,6 +346,9 @@ std::vector<Parameter> parameters(PointViewMatcherParams& params)
           boolean("scale_search", params.scale_search, "try other scales when the first finds no geometry"),
           real("min_significance", params.min_log_significance, "", ">= 0",
                "-log10 of the false alarms a geometry may have"),
+          boolean("unique", params.unique, "refuse a view that fits at another place nearly as well"),
+          real("min_parallax", params.min_log_parallax, "", ">= 0",
+               "-log10 of the false alarms a fundamental matrix may have off its best plane"),
           natural("seed", params.seed, "of all random draws"),
       },
       parameters(params.ransac),
@@ -341,6 +388,8 @@ ViewMatch PointViewMatcher::match(const PreparedImage& reference, const Prepared
   StageClock clock(result.stages);
   bool any_features = false;
   bool ended_early = false;
+  bool left_open = false;
+  bool repeated = false;
   for (const LevelTrial& trial : levelTrials(params_))
   {
     ended_early = given_up && given_up();
@@ -358,20 +407,27 @@ ViewMatch PointViewMatcher::match(const PreparedImage& reference, const Prepared
       continue;
     }
     any_features = true;
-    const bool accepted = attempt.run(result, clock, rng);
+    bool accepted = attempt.run(result, clock, rng);
     if (accepted && params_.guided)
     {
-      attempt.guide();
+      attempt.guide(rng);
       clock.finish("guided");
+    }
+    if (accepted && params_.unique)
+    {
+      repeated = attempt.isRepeated(rng);
+      accepted = !repeated;
+      clock.finish("unique");
     }
     if (accepted || (trial.levels.reference == 0 && trial.levels.current == 0))
     {
       // Without a geometry, the candidates of the full images are reported.
       attempt.report(accepted, result);
     }
-    if (accepted)
+    left_open = attempt.leftOpen();
+    if (accepted || repeated || (left_open && trial.share == params_.points.search.share))
     {
-      break;
+      break;  // what repeats itself at this scale, or lies on one plane, does at others
     }
   }
 
@@ -383,6 +439,16 @@ ViewMatch PointViewMatcher::match(const PreparedImage& reference, const Prepared
   else if (ended_early)
   {
     result.message = "given up";
+  }
+  else if (repeated)
+  {
+    result.message = REPEATED;
+  }
+  else if (left_open)
+  {
+    result.message =
+        "no geometry found: what matches lies on one plane, which leaves the fundamental matrix open; look for "
+        "a homography";
   }
   else if (!any_features)
   {

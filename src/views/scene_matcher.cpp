@@ -2,6 +2,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "view_servo/views/scene_matcher.h"
 
+#include "repetition.h"
 #include "stage_clock.h"
 #include "view_servo/geometry/fundamental.h"
 #include "view_servo/geometry/homography.h"
@@ -176,6 +177,20 @@ public:
       consider(*std::exchange(matrix_, std::nullopt));
     }
     return holds();
+  }
+
+  /** Whether more than half of what agrees lies on one plane and is found elsewhere nearly as well. */
+  bool isRepeated() const
+  {
+    const Plane* best = bestPlane();
+    if (best == nullptr)
+    {
+      return false;
+    }
+    const Correspondences on_plane = onPlane(best->h);
+    const std::size_t agree = matrix_ ? agreeing(*matrix_).size() : 0;
+    return 2 * on_plane.size() > agree &&
+           otherPlace(reference_.grey(), current_.grey(), on_plane, current_.points(0).corners, best->h);
   }
 
   /** The plane that corners confirm best, when it is beyond doubt and not mirrored. */
@@ -407,7 +422,7 @@ private:
       const double significance = significanceOf(choice);
       // A plane that is beyond doubt and what its parallax says determine a fundamental matrix as well as all matches do.
       const double evidence = isBeyondDoubt(&plane) ? std::max(significance, held) : significance;
-      const double margin = std::min(held - params_.min_log_parallax, evidence - params_.min_log_significance);
+      const double margin = std::min(held - params_.points.min_log_parallax, evidence - params_.min_log_significance);
       // Of those that hold, the one with which most matches agree.
       const std::size_t support = agreeing(choice).size();
       const bool better = margin >= 0.0 && margin_ >= 0.0 ? support > support_ : margin > margin_;
@@ -468,7 +483,6 @@ std::vector<Parameter> sceneParameters(SceneMatcherParams& params)
     real("plane_correlation", params.plane_correlation, "", "[0, 1)", "least correlation of patches along a plane"),
     real("scene_significance", params.min_log_significance, "", ">= 0",
          "-log10 of the false alarms an answer may have"),
-    real("scene_parallax", params.min_log_parallax, "", ">= 0", "the same of what lies off the best plane"),
     natural("scene_seed", params.seed, "of the random draws of points and lines together"),
   };
 }
@@ -542,18 +556,24 @@ ViewMatch SceneMatcher::match(const PreparedImage& reference, const PreparedImag
   clock.finish("fundamental");
 
   const std::optional<Eigen::Matrix3d> plane = found ? std::nullopt : attempt.plane();
-  if (found)
+  const bool repeated = (found || plane) && params_.points.unique && attempt.isRepeated();
+  clock.finish("unique");
+  if (found && !repeated)
   {
     attempt.reportFundamental(result);
     attempt.reportLines(lines.lines, result);
   }
-  else if (plane)
+  else if (plane && !repeated)
   {
     attempt.reportPlane(*plane, result);
   }
   attempt.reportCandidates(result);
   const std::string count = std::to_string(result.inliers) + " of " + std::to_string(result.matches.size());
-  if (found)
+  if (repeated)
+  {
+    result.message = REPEATED;
+  }
+  else if (found)
   {
     result.message = count + " points, " + std::to_string(result.lines.size()) + " lines and " +
                      std::to_string(result.planes.size()) + " planes agree with one fundamental matrix";

@@ -160,6 +160,20 @@ TEST(PointViewMatcher, FindsEpipolarGeometryOfASceneWithDepth)
   }
 }
 
+TEST(PointViewMatcher, APlaneLeavesTheFundamentalMatrixOpen)
+{
+  for (const int corners : { 250, 500, 1000 })
+  {
+    PointViewMatcherParams params;
+    params.points.corners.max_corners = corners;
+    const cv::Mat reference = texturedPicture(1);
+    const cv::Mat current = disturbed(warpedPicture(reference, exampleHomography(), SIZE), 0.8, 10.0, 2.0);
+    const ViewMatch match = matchImages(params, reference, current, GeometryModel::FUNDAMENTAL);
+    EXPECT_EQ(match.outcome, MatchOutcome::NO_GEOMETRY) << corners << " corners: " << match.message;
+    EXPECT_NE(match.message.find("look for a homography"), std::string::npos) << match.message;
+  }
+}
+
 TEST(PointViewMatcher, SeveralHypothesesFindTheSameGeometryFromMoreMatches)
 {
   const cv::Mat reference = blotchedPicture(2, 2.0);

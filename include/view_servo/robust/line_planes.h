@@ -53,11 +53,10 @@ bool liesOnPlane(const LinePlanes& planes, const Correspondence& point, double t
 
 /**
  * Fundamental matrix (x_curᵀ F x_ref = 0, pixels) by RANSAC from points, such as intersections of matched lines. Empty
- * when there are fewer than twelve, when no matrix agrees with twelve, and when nearly all lie on one of the planes,
- * which leaves F undetermined.
+ * when there are fewer than twelve and when no matrix agrees with twelve. Where nearly all lie on one plane, any F with
+ * some epipole agrees: see Parallax.
  */
-std::optional<Eigen::Matrix3d> fundamentalOfPoints(const Correspondences& points, const LinePlanes& planes,
-                                                   const RansacParams& params, Rng& rng);
+std::optional<Eigen::Matrix3d> fundamentalOfPoints(const Correspondences& points, const RansacParams& params, Rng& rng);
 
 /**
  * Fundamental matrix from the first two planes (thesis 4.7): the fit to the end points of their lines, each paired with

@@ -25,8 +25,11 @@ struct LineMatcherParams
   LineRegionParams regions;
   RansacParams ransac;  ///< for points and lines; the inlier threshold is that of points [px]
   LinePlaneParams planes;
-  double min_quality = 0.5;  ///< least MatchedLine::score of a match
-  std::uint64_t seed = 1;    ///< fixes all random draws
+  double min_quality = 0.5;           ///< least MatchedLine::score of a match
+  double min_log_significance = 6.0;  ///< least ViewMatch::log_significance of a geometry that is accepted
+  bool unique = true;                 ///< refuse a geometry when another one, a shift off, fits nearly as well
+  double min_log_parallax = 3.0;  ///< least Parallax::significance() of a fundamental matrix, off each of the planes
+  std::uint64_t seed = 1;         ///< fixes all random draws
 
   LineMatcherParams();
 
@@ -59,7 +62,10 @@ public:
    * or the fundamental matrix, as `model` says.
    *
    * Steps: groups vote for pairs of segments; from these grow regions of segments that agree with a local homography;
-   * regions that contradict the epipolar geometry of all are dropped; planes are fitted to what remains.
+   * regions that contradict the epipolar geometry of all are dropped; planes are fitted to what remains. The answer is
+   * accepted if segments are found where the regions send them more often than beside, in all directions of shift, and
+   * a fundamental matrix only if it stands without any one plane. What is not accepted still has `lines`, `matches` and
+   * `planes`, for those who can tell by other means.
    *
    * Both LineFeatures must have been made with params().features.
    */

@@ -51,6 +51,8 @@ struct PointViewMatcherParams
   double first_share = 0.6;
   bool scale_search = true;  ///< try other scale ratios and coarser scales when the full images give no geometry
   double min_log_significance = 6.0;  ///< least ViewMatch::log_significance of a geometry that is accepted
+  bool unique = true;                 ///< refuse a geometry when another one, a shift off, fits nearly as well
+  double min_log_parallax = 3.0;      ///< least Parallax::significance() of a fundamental matrix, off its best plane
   std::uint64_t seed = 1;             ///< fixes all random draws
 
   /** All faults, one a line; empty when the parameters are usable. */

@@ -22,7 +22,6 @@ struct SceneMatcherParams
   double inlier_threshold = 2.0;      ///< largest Sampson distance of a match that agrees [px]
   double plane_correlation = 0.75;    ///< least correlation of a corner's patch, warped by the homography of a plane
   double min_log_significance = 6.0;  ///< least -log10 of the false alarms of a fundamental matrix
-  double min_log_parallax = 3.0;      ///< least Parallax::significance() of a fundamental matrix
   std::uint64_t seed = 1;             ///< fixes all random draws of this stage
 
   SceneMatcherParams();

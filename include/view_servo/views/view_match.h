@@ -71,11 +71,16 @@ struct ViewMatch
   std::vector<StageTime> stages;  ///< in the order of their ends
   double elapsed_ms = 0.0;        ///< of the whole match [ms]
 
-  /** @name Set by PointViewMatcher only; zero otherwise. SceneMatcher sets the first for a fundamental matrix.
+  /**
+   * -log10 of the expected number of geometries this good among chance matches; for LineViewMatcher of the probability
+   * that chance matches as many lines. Zero for a homography of SceneMatcher.
+   */
+  double log_significance = 0.0;
+
+  /** @name Set by PointViewMatcher only; zero otherwise.
    * @{ */
-  double log_significance = 0.0;  ///< -log10 of the expected number of geometries this good among chance matches
-  int reference_level = 0;        ///< level of the reference PreparedImage at which the geometry was found
-  int current_level = 0;          ///< the same of the current one
+  int reference_level = 0;  ///< level of the reference PreparedImage at which the geometry was found
+  int current_level = 0;    ///< the same of the current one
   /** @} */
 
   /** @name Set by LineViewMatcher and SceneMatcher; empty and NaN otherwise.

@@ -1,0 +1,118 @@
+// Copyright (c) 2026, the view_servo authors
+// SPDX-License-Identifier: BSD-3-Clause
+#include "support/corner_error.h"
+#include "support/textured_plane.h"
+#include "view_servo/views/line_view_matcher.h"
+#include "view_servo/views/point_view_matcher.h"
+#include "view_servo/views/prepared_image.h"
+#include "view_servo/views/scene_matcher.h"
+
+#include <gtest/gtest.h>
+#include <opencv2/core.hpp>
+#include <opencv2/imgproc.hpp>
+
+#include <cstdint>
+#include <random>
+#include <string>
+
+namespace view_servo
+{
+namespace
+{
+const cv::Size SIZE(640, 480);
+constexpr int PERIOD = 72;  // [px]
+
+/** A wall of windows, all alike, each of a few panes. */
+cv::Mat wall(std::uint64_t seed, const cv::Size& size)
+{
+  std::mt19937_64 random(seed);
+  std::uniform_int_distribution<int> grey(20, 230);
+  std::uniform_int_distribution<int> at(6, 38);
+  std::uniform_int_distribution<int> side(12, 26);
+  cv::Mat window(PERIOD, PERIOD, CV_8UC1, cv::Scalar(grey(random)));
+  for (int pane = 0; pane < 4; ++pane)
+  {
+    cv::rectangle(window, cv::Rect(at(random), at(random), side(random), side(random)), cv::Scalar(grey(random)),
+                  cv::FILLED);
+  }
+  const cv::Mat all = cv::repeat(window, size.height / PERIOD + 1, size.width / PERIOD + 1);
+  return all(cv::Rect(cv::Point(), size)).clone();
+}
+
+cv::Mat photographed(const cv::Mat& picture)
+{
+  cv::Mat blurred;
+  cv::GaussianBlur(picture, blurred, cv::Size(), 0.8);
+  return test::disturbed(blurred, 1.0, 0.0, 2.0);
+}
+
+struct Answers
+{
+  ViewMatch points;
+  ViewMatch points_with_depth;
+  ViewMatch lines;
+  ViewMatch scene;
+};
+
+Answers answers(const cv::Mat& reference_image, const cv::Mat& current_image, bool unique = true)
+{
+  SceneMatcherParams params;
+  params.points.unique = params.lines.unique = unique;
+  const SceneMatcher scene(params);
+  const PreparedImage reference(reference_image, cv::Rect(), scene.features());
+  const PreparedImage current(current_image, cv::Rect(), scene.features());
+  const PointViewMatcher points(params.points);
+  return { points.match(reference, current, GeometryModel::HOMOGRAPHY),
+           points.match(reference, current, GeometryModel::FUNDAMENTAL),
+           LineViewMatcher(params.lines).match(reference, current), scene.match(reference, current) };
+}
+
+}  // namespace
+
+class RepeatedWindows : public testing::TestWithParam<std::uint64_t>
+{
+};
+
+TEST_P(RepeatedWindows, AreRefusedByAll)
+{
+  // The camera has moved by one window: a match that is one window off is as good as the right one.
+  const cv::Mat picture = wall(GetParam(), SIZE + cv::Size(PERIOD, 0));
+  const Answers found = answers(photographed(picture(cv::Rect(cv::Point(0, 0), SIZE))),
+                                photographed(picture(cv::Rect(cv::Point(PERIOD, 0), SIZE))));
+  for (const ViewMatch& match : { found.points, found.points_with_depth, found.lines, found.scene })
+  {
+    EXPECT_EQ(match.outcome, MatchOutcome::NO_GEOMETRY) << match.message;
+    EXPECT_TRUE(match.matrix.hasNaN());
+  }
+  EXPECT_NE(found.points.message.find("repeats itself"), std::string::npos) << found.points.message;
+  EXPECT_NE(found.lines.message.find("repeats itself"), std::string::npos) << found.lines.message;
+  EXPECT_NE(found.scene.message.find("repeats itself"), std::string::npos) << found.scene.message;
+}
+
+INSTANTIATE_TEST_SUITE_P(Walls, RepeatedWindows, testing::Values(1, 2, 3));
+
+TEST(Repetition, IsAllowedWhereThatIsAskedFor)
+{
+  const cv::Mat picture = wall(1, SIZE);
+  const Answers found = answers(photographed(picture), photographed(picture), false);
+  for (const ViewMatch& match : { found.points, found.lines, found.scene })
+  {
+    EXPECT_EQ(match.outcome, MatchOutcome::MATCHED) << match.message;
+  }
+}
+
+TEST(Repetition, IsNoneWhereMostOfTheViewIsUnique)
+{
+  // Windows between pictures of which each is another.
+  cv::Mat picture = test::texturedPicture(7, SIZE);
+  wall(1, cv::Size(4 * PERIOD, 3 * PERIOD)).copyTo(picture(cv::Rect(160, 120, 4 * PERIOD, 3 * PERIOD)));
+  const Eigen::Matrix3d h = test::exampleHomography();
+  const Answers found = answers(photographed(picture), photographed(test::warpedPicture(picture, h, SIZE)));
+  for (const ViewMatch& match : { found.points, found.lines, found.scene })
+  {
+    EXPECT_EQ(match.outcome, MatchOutcome::MATCHED) << match.message;
+    EXPECT_LT(test::cornerError(match.matrix, h, SIZE), 2.0);
+  }
+}
+
+}  // namespace view_servo
