@@ -6,6 +6,7 @@
 #include "residuals.h"
 #include "view_servo/geometry/fundamental.h"
 
+#include <Eigen/LU>
 #include <opencv2/calib3d.hpp>
 #include <opencv2/core/eigen.hpp>
 
@@ -152,6 +153,17 @@ RelativePose refineRelativePose(const RelativePose& initial, const Correspondenc
   RelativePose pose = initial;
   levenbergMarquardt(RelativePoseProblem{ pairs }, pose, max_iterations);
   return pose;
+}
+
+Eigen::Matrix<double, 6, 6> covarianceOf(const RelativePose& pose, const Correspondences& pairs, double variance)
+{
+  Eigen::Matrix<double, 5, 5> information;
+  Eigen::Matrix<double, 5, 1> gradient;
+  RelativePoseProblem{ pairs }.linearize(pose, information, gradient);
+  Eigen::Matrix<double, 6, 5> spread = Eigen::Matrix<double, 6, 5>::Zero();
+  spread.topLeftCorner<3, 3>().setIdentity();
+  spread.bottomRightCorner<3, 2>() = RelativePoseProblem::tangentsOf(pose.translation).leftCols<2>();
+  return variance * spread * information.inverse() * spread.transpose();
 }
 
 }  // namespace view_servo

@@ -2,15 +2,19 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "tools/command_line.h"
 #include "view_servo/features/line_segments.h"
+#include "view_servo/geometry/camera.h"
 #include "view_servo/geometry/correspondence.h"
+#include "view_servo/geometry/fundamental.h"
 #include "view_servo/images/image_io.h"
 #include "view_servo/matching/line_features.h"
 #include "view_servo/parameters/parameter.h"
+#include "view_servo/views/camera_file.h"
 #include "view_servo/views/line_view_matcher.h"
 #include "view_servo/views/overlay.h"
 #include "view_servo/views/point_view_matcher.h"
 #include "view_servo/views/prepared_image.h"
 #include "view_servo/views/scene_matcher.h"
+#include "view_servo/views/scene_motion.h"
 #include "view_servo/views/segment_io.h"
 
 #include <Eigen/Geometry>
@@ -22,6 +26,7 @@
 
 #include <algorithm>
 #include <chrono>
+#include <cmath>
 #include <fstream>
 #include <iostream>
 #include <iterator>
@@ -86,6 +91,8 @@ struct Options
   std::string groups = "triplets";
   std::string reference_segments;
   std::string current_segments;
+  std::string reference_camera;
+  std::string current_camera;
   std::string overlay;
   std::string truth;
   std::vector<std::string> settings;
@@ -395,17 +402,101 @@ ExitStatus matchLines(const Options& options)
                         { "fundamental", toJson(match.fundamental) } });
 }
 
+Camera readCamera(const std::string& option, const std::string& path, const cv::Size& image)
+{
+  try
+  {
+    const Camera camera = readCameraFile(path);
+    if (camera.width != image.width || camera.height != image.height)
+    {
+      throw std::runtime_error("'" + path + "' is of images of " + std::to_string(camera.width) + " x " +
+                               std::to_string(camera.height) + ", not " + std::to_string(image.width) + " x " +
+                               std::to_string(image.height));
+    }
+    return camera;
+  }
+  catch (const std::runtime_error& error)
+  {
+    throw BadInput(option + ": " + error.what());
+  }
+}
+
+/** In pixels; null where it is at infinity. */
+nlohmann::json epipoleToJson(const Eigen::Vector3d& epipole)
+{
+  constexpr double FARTHEST = 1e6;  // [px]
+  const Eigen::Vector2d at = epipole.hnormalized();
+  return at.allFinite() && at.norm() < FARTHEST ? toJson(at) : nlohmann::json();
+}
+
+nlohmann::json toJson(const SceneMotion& motion)
+{
+  const Eigen::Quaterniond rotation(motion.pose.rotation);
+  const Eigen::Vector3d& direction = motion.pose.translation;
+  return { { "rotation", { rotation.x(), rotation.y(), rotation.z(), rotation.w() } },
+           { "direction", { direction.x(), direction.y(), direction.z() } },
+           { "covariance", std::vector<double>(motion.covariance.data(), motion.covariance.data() + 36) },
+           { "inliers", motion.inliers } };
+}
+
+void printMotion(const SceneMotion& motion)
+{
+  constexpr double DEGREES = 180.0 / M_PI;
+  const Eigen::AngleAxisd turn(motion.pose.rotation);
+  std::cout << "motion, X_cur = R X_ref + t: a turn of " << turn.angle() * DEGREES << " degrees about "
+            << turn.axis().transpose() << ", t along " << motion.pose.translation.transpose()
+            << " (standard deviations: " << std::sqrt(motion.covariance.topLeftCorner<3, 3>().trace() / 3.0) * DEGREES
+            << " and " << std::sqrt(motion.covariance.bottomRightCorner<3, 3>().trace() / 2.0) * DEGREES
+            << " degrees)\n";
+}
+
 ExitStatus matchScene(const Options& options)
 {
   const auto matcher = makeMatcher<SceneMatcher, SceneMatcherParams>(options.settings);
   const Report report(options);
+  if (options.reference_camera.empty() != options.current_camera.empty())
+  {
+    throw BadInput(options.reference_camera.empty() ? "--camera-ref is missing: give it as well as --camera-cur"
+                                                    : "--camera-cur is missing: give it as well as --camera-ref");
+  }
   const FeatureParams features = matcher.features();
   const PreparedImage reference(readImage(options.reference), cv::Rect(), features);
   const PreparedImage current(readImage(options.current), cv::Rect(), features);
+  std::optional<Camera> cameras[2];
+  if (!options.reference_camera.empty())
+  {
+    cameras[0] = readCamera("--camera-ref", options.reference_camera, reference.grey().size());
+    cameras[1] = readCamera("--camera-cur", options.current_camera, current.grey().size());
+  }
   const ViewMatch match = matcher.match(reference, current);
-  return report.write(
-      match, reference, current,
-      { { "matches", toJson(match.matches) }, { "lines", toJson(match.lines) }, { "planes", toJson(match.planes) } });
+  const std::optional<SceneMotion> motion =
+      cameras[0] ? sceneMotion(match, *cameras[0], *cameras[1]) : std::optional<SceneMotion>();
+  nlohmann::json more = {
+    { "matches", toJson(match.matches) }, { "lines", toJson(match.lines) },
+    { "planes", toJson(match.planes) },   { "epipole_reference", nullptr },
+    { "epipole_current", nullptr },       { "motion", motion ? toJson(*motion) : nlohmann::json() }
+  };
+  if (match.outcome == MatchOutcome::MATCHED && match.model == GeometryModel::FUNDAMENTAL)
+  {
+    more["epipole_reference"] = epipoleToJson(referenceEpipole(match.matrix));
+    more["epipole_current"] = epipoleToJson(currentEpipole(match.matrix));
+  }
+  const ExitStatus status = report.write(match, reference, current, more);
+  if (cameras[0] && status == FOUND && !options.json)
+  {
+    if (motion)
+    {
+      printMotion(*motion);
+    }
+    else
+    {
+      std::cout << "no motion: "
+                << (match.model == GeometryModel::HOMOGRAPHY ? "a plane leaves two of them"
+                                                             : "too few points agree with one")
+                << '\n';
+    }
+  }
+  return status;
 }
 
 template <typename Params>
@@ -469,6 +560,13 @@ std::optional<Options> readOptions(Subcommand subcommand, int argc, const char* 
     line.text("segments-ref", options.reference_segments,
               "File with the reference's segments, a line x1 y1 x2 y2 each; else they are detected");
     line.text("segments-cur", options.current_segments, "File with the current image's segments");
+  }
+  if (subcommand == Subcommand::SCENE)
+  {
+    line.text("camera-ref", options.reference_camera,
+              "Calibration of the reference's camera, a file of camera_calibration or of a stored view; with both "
+              "cameras the answer has the motion between the views");
+    line.text("camera-cur", options.current_camera, "Calibration of the current image's camera");
   }
   const std::optional<std::vector<std::string>> words = line.parse(argc, argv);
   if (!words)

@@ -2,6 +2,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "view_servo/views/view_store.h"
 
+#include "camera_yaml.h"
 #include "view_servo/images/image_io.h"
 #include "view_servo/images/regular_file.h"
 
@@ -300,23 +301,6 @@ std::vector<double> toList(const Matrix& matrix)
   return list;
 }
 
-template <typename Matrix>
-void fromList(const YAML::Node& node, Matrix& matrix)
-{
-  const auto list = node.as<std::vector<double>>();
-  if (static_cast<Eigen::Index>(list.size()) != matrix.size())
-  {
-    throw Damage("a list of " + std::to_string(matrix.size()) + " numbers has " + std::to_string(list.size()));
-  }
-  for (Eigen::Index row = 0; row < matrix.rows(); ++row)
-  {
-    for (Eigen::Index column = 0; column < matrix.cols(); ++column)
-    {
-      matrix(row, column) = list[static_cast<std::size_t>(row * matrix.cols() + column)];
-    }
-  }
-}
-
 template <typename Value>
 void emit(YAML::Emitter& yaml, const std::string& key, const Value& value)
 {
@@ -334,19 +318,6 @@ void emit(YAML::Emitter& yaml, const Camera& camera)
   emit(yaml, "R", toList(camera.rectification));
   emit(yaml, "P", toList(camera.projection));
   yaml << YAML::EndMap;
-}
-
-Camera cameraFromYaml(const YAML::Node& node)
-{
-  Camera camera;
-  camera.width = node["width"].as<int>();
-  camera.height = node["height"].as<int>();
-  camera.distortion_model = node["distortion_model"].as<std::string>();
-  camera.distortion = node["D"].as<std::vector<double>>();
-  fromList(node["K"], camera.k);
-  fromList(node["R"], camera.rectification);
-  fromList(node["P"], camera.projection);
-  return camera;
 }
 
 void emit(YAML::Emitter& yaml, const ViewPose& pose)

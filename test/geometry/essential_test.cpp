@@ -103,6 +103,34 @@ TEST(Essential, OneOfItsFourMotionsIsTheTrueOne)
   EXPECT_EQ(right, 1);
 }
 
+TEST(Essential, CovarianceIsThatOfMotionsFittedToManyDraws)
+{
+  constexpr double NOISE = 1e-3;
+  constexpr int DRAWS = 400;
+  const Problem problem(7, 60, 0.0);
+  Rng rng(11);
+  Eigen::Matrix<double, 6, 6> sum = Eigen::Matrix<double, 6, 6>::Zero();
+  for (int draw = 0; draw < DRAWS; ++draw)
+  {
+    Correspondences noisy = problem.pairs;
+    for (Correspondence& pair : noisy)
+    {
+      pair.reference += NOISE * Eigen::Vector2d(gaussian(rng), gaussian(rng));
+      pair.current += NOISE * Eigen::Vector2d(gaussian(rng), gaussian(rng));
+    }
+    const RelativePose found = refineRelativePose(problem.motion, noisy);
+    const Eigen::AngleAxisd turn(problem.motion.rotation.transpose() * found.rotation);
+    Eigen::Matrix<double, 6, 1> error;
+    error << turn.angle() * turn.axis(), found.translation - problem.motion.translation;
+    sum += error * error.transpose();
+  }
+  const Eigen::Matrix<double, 6, 6> measured = sum / DRAWS;
+  const Eigen::Matrix<double, 6, 6> told = covarianceOf(problem.motion, problem.pairs, NOISE * NOISE);
+  EXPECT_LT((measured - told).norm(), 0.25 * told.norm()) << measured << "\n" << told;
+  EXPECT_LT((told * (Eigen::Matrix<double, 6, 1>() << 0.0, 0.0, 0.0, problem.motion.translation).finished()).norm(),
+            1e-9);
+}
+
 TEST(Essential, RefinementFindsTheLeastError)
 {
   const Problem problem(5, 100, 0.5 / 500.0);

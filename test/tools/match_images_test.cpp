@@ -2,6 +2,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // Runs the program itself, as a shell would.
 #include "support/corner_error.h"
+#include "support/room_corner.h"
 #include "support/temporary_directory.h"
 #include "support/textured_plane.h"
 #include "test_paths.h"
@@ -273,6 +274,39 @@ TEST_F(MatchImages, MatchesAScene)
   EXPECT_EQ(run({ "scene", reference_, write("other.png", texture(9)) }).status, 1);
   EXPECT_EQ(run({ "scene", reference_, current_, "--set", "scene_threshold=1.5" }).status, 0);
   EXPECT_EQ(run({ "scene", reference_, current_, "--model", "homography" }).status, 2) << "it finds out by itself";
+}
+
+TEST_F(MatchImages, TellsTheMotionInASceneOfKnownCameras)
+{
+  const view_servo::test::RoomCorner room;
+  const std::string reference = write("room.png", room.reference);
+  const std::string current = write("moved.png", room.current);
+  const std::string camera = path("camera.yaml");
+  writeText("camera.yaml",
+            "image_width: 640\nimage_height: 480\ncamera_matrix:\n  data: [500, 0, 319.5, 0, 500, 239.5, "
+            "0, 0, 1]\ndistortion_model: plumb_bob\ndistortion_coefficients:\n  data: [0, 0, 0, 0, 0]\n");
+  const std::vector<std::string> words = {
+    "scene", reference, current, "--camera-ref", camera, "--camera-cur", camera
+  };
+  std::vector<std::string> in_json = words;
+  in_json.emplace_back("--json");
+  const Outcome outcome = run(in_json);
+  EXPECT_EQ(outcome.status, 0) << outcome.err;
+  const json result = json::parse(outcome.out);
+  EXPECT_EQ(result.at("model"), "fundamental") << result.at("message");
+  const json& motion = result.at("motion");
+  EXPECT_NEAR(motion.at("rotation").at(1).get<double>(), std::sin(0.5 * 0.15), 0.003);
+  EXPECT_NEAR(motion.at("direction").at(0).get<double>(), -0.6 / std::sqrt(0.41), 0.03);
+  EXPECT_EQ(motion.at("covariance").size(), 36U);
+  EXPECT_EQ(result.at("epipole_current").size(), 2U);
+  EXPECT_NEAR(result.at("epipole_current").at(0).get<double>(), 319.5 - 500.0 * 0.6 / 0.2, 150.0);
+  EXPECT_NE(run(words).out.find("X_cur = R X_ref + t"), std::string::npos);
+
+  EXPECT_TRUE(json::parse(run({ "scene", reference, current, "--json" }).out).at("motion").is_null());
+  expectBadInput(run({ "scene", reference, current, "--camera-ref", camera }), "--camera-cur is missing");
+  expectBadInput(run({ "scene", reference, current, "--camera-ref", path("none.yaml"), "--camera-cur", camera }),
+                 "none.yaml");
+  expectBadInput(run({ "scene", reference_, current, "--camera-ref", camera, "--camera-cur", camera }), "640 x 480");
 }
 
 TEST_F(MatchImages, ComparesWithTheTruth)

@@ -39,4 +39,11 @@ std::vector<RelativePose> posesFromEssential(const Eigen::Matrix3d& essential);
  */
 RelativePose refineRelativePose(const RelativePose& initial, const Correspondences& pairs, int max_iterations = 10);
 
+/**
+ * Covariance of a motion that was fitted to pairs, to first order: of a small rotation vector [rad] applied before R, so
+ * about the axes of the reference camera, and of the unit vector t, which does not vary along itself.
+ * @param variance of a Sampson distance, in units of the points. @return not finite where the pairs leave the motion open.
+ */
+Eigen::Matrix<double, 6, 6> covarianceOf(const RelativePose& pose, const Correspondences& pairs, double variance);
+
 }  // namespace view_servo

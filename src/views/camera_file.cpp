@@ -1,0 +1,90 @@
+// Copyright (c) 2026, the view_servo authors
+// SPDX-License-Identifier: BSD-3-Clause
+#include "view_servo/views/camera_file.h"
+
+#include "camera_yaml.h"
+
+#include <cstdint>
+#include <exception>
+#include <filesystem>
+#include <fstream>
+#include <stdexcept>
+#include <system_error>
+#include <vector>
+
+namespace view_servo
+{
+namespace
+{
+/** As camera_calibration writes it; it leaves out no field, but others' files do. */
+Camera calibrationFromYaml(const YAML::Node& node)
+{
+  Camera camera;
+  camera.width = node["image_width"].as<int>();
+  camera.height = node["image_height"].as<int>();
+  fromList(node["camera_matrix"]["data"], camera.k);
+  if (const YAML::Node distortion = node["distortion_coefficients"])
+  {
+    camera.distortion_model = node["distortion_model"].as<std::string>();
+    camera.distortion = distortion["data"].as<std::vector<double>>();
+  }
+  if (const YAML::Node rectification = node["rectification_matrix"])
+  {
+    fromList(rectification["data"], camera.rectification);
+  }
+  if (const YAML::Node projection = node["projection_matrix"])
+  {
+    fromList(projection["data"], camera.projection);
+  }
+  return camera;
+}
+
+Camera anyCameraFromYaml(const YAML::Node& node)
+{
+  if (node.IsMap() && node["camera_matrix"])
+  {
+    return calibrationFromYaml(node);
+  }
+  if (node.IsMap() && node["camera"])
+  {
+    return cameraFromYaml(node["camera"]);
+  }
+  if (node.IsMap() && node["K"])
+  {
+    return cameraFromYaml(node);
+  }
+  throw std::runtime_error("it has none of camera_matrix, camera and K");
+}
+
+}  // namespace
+
+Camera readCameraFile(const std::string& path)
+{
+  constexpr std::uintmax_t LARGEST = 1000000;  // [bytes]
+  try
+  {
+    std::error_code error;
+    if (!std::filesystem::is_regular_file(path, error))
+    {
+      throw std::runtime_error("there is no such file");
+    }
+    if (std::filesystem::file_size(path) > LARGEST)
+    {
+      throw std::runtime_error("it is no calibration, being larger than 1 MB");
+    }
+    std::ifstream file(path);
+    const Camera camera = anyCameraFromYaml(YAML::Load(file));
+    const std::string fault = camera.fault();
+    if (!fault.empty())
+    {
+      throw std::runtime_error(fault);
+    }
+    return camera;
+  }
+  catch (const std::exception& error)
+  {
+    throw std::runtime_error("no calibration can be read from '" + path + "': " + error.what());
+  }
+}
+
+}  // namespace view_servo

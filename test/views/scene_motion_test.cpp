@@ -1,0 +1,91 @@
+// Copyright (c) 2026, the view_servo authors
+// SPDX-License-Identifier: BSD-3-Clause
+#include "view_servo/views/scene_motion.h"
+
+#include "support/room_corner.h"
+#include "view_servo/views/prepared_image.h"
+#include "view_servo/views/scene_matcher.h"
+
+#include <gtest/gtest.h>
+#include <Eigen/Eigenvalues>
+#include <Eigen/Geometry>
+
+#include <cmath>
+#include <stdexcept>
+#include <string>
+
+namespace view_servo
+{
+namespace
+{
+Camera cameraOfTheRoom()
+{
+  Camera camera;
+  camera.width = 640;
+  camera.height = 480;
+  camera.distortion_model = "plumb_bob";
+  camera.k << 500.0, 0.0, 319.5, 0.0, 500.0, 239.5, 0.0, 0.0, 1.0;
+  return camera;
+}
+
+ViewMatch matchScene(const cv::Mat& reference, const cv::Mat& current)
+{
+  const SceneMatcher matcher{ SceneMatcherParams() };
+  return matcher.match(PreparedImage(reference, cv::Rect(), matcher.features()),
+                       PreparedImage(current, cv::Rect(), matcher.features()));
+}
+
+}  // namespace
+
+TEST(SceneMotion, IsThatOfTheCameraInARoom)
+{
+  const test::RoomCorner room;
+  const auto motion = sceneMotion(matchScene(room.reference, room.current), cameraOfTheRoom(), cameraOfTheRoom());
+  ASSERT_TRUE(motion);
+  // As RoomCorner moves it.
+  const Eigen::Matrix3d turn = Eigen::AngleAxisd(0.15, Eigen::Vector3d::UnitY()).toRotationMatrix();
+  const Eigen::Vector3d direction = Eigen::Vector3d(-0.6, 0.1, 0.2).normalized();
+  EXPECT_LT(Eigen::AngleAxisd(turn.transpose() * motion->pose.rotation).angle(), 0.005);
+  EXPECT_LT(std::acos(std::min(1.0, direction.dot(motion->pose.translation))), 0.03);
+  EXPECT_GE(motion->inliers, 100U);
+}
+
+TEST(SceneMotion, HasACovarianceThatIsOne)
+{
+  const test::RoomCorner room;
+  const auto motion = sceneMotion(matchScene(room.reference, room.current), cameraOfTheRoom(), cameraOfTheRoom());
+  ASSERT_TRUE(motion);
+  const Eigen::Matrix<double, 6, 6>& covariance = motion->covariance;
+  EXPECT_TRUE(covariance.isApprox(covariance.transpose(), 1e-9));
+  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix<double, 6, 6>> eigen(covariance);
+  EXPECT_GT(eigen.eigenvalues()(0), -1e-12);
+  EXPECT_LT((covariance.bottomRightCorner<3, 3>() * motion->pose.translation).norm(), 1e-9)
+      << "a unit vector does not vary along itself";
+  const double turn = std::sqrt(covariance.topLeftCorner<3, 3>().trace());
+  EXPECT_GT(turn, 1e-4);
+  EXPECT_LT(turn, 0.05);
+}
+
+TEST(SceneMotion, IsNotToldOfAPlane)
+{
+  const cv::Mat picture = test::texturedPicture(4, test::PICTURE_SIZE);
+  const ViewMatch match = matchScene(picture, test::warped(picture, test::exampleHomography()));
+  ASSERT_EQ(match.model, GeometryModel::HOMOGRAPHY);
+  EXPECT_FALSE(sceneMotion(match, cameraOfTheRoom(), cameraOfTheRoom()));
+  EXPECT_FALSE(sceneMotion(ViewMatch(), cameraOfTheRoom(), cameraOfTheRoom()));
+}
+
+TEST(SceneMotion, NeedsCalibratedCameras)
+{
+  try
+  {
+    sceneMotion(ViewMatch(), cameraOfTheRoom(), Camera());
+    FAIL() << "a camera without calibration is refused";
+  }
+  catch (const std::invalid_argument& error)
+  {
+    EXPECT_NE(std::string(error.what()).find("the current camera: "), std::string::npos) << error.what();
+  }
+}
+
+}  // namespace view_servo
