@@ -4,6 +4,8 @@
 
 #include "view_servo/geometry/fundamental.h"
 #include "view_servo/geometry/homography.h"
+#include "view_servo/robust/homography_estimator.h"
+#include "view_servo/robust/ransac.h"
 #include "view_servo/robust/significance.h"
 
 #include <Eigen/Geometry>
@@ -11,6 +13,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
+#include <iterator>
 #include <limits>
 
 namespace view_servo
@@ -97,6 +100,36 @@ std::optional<Eigen::Matrix3d> Parallax::findFundamental(int samples, Rng& rng) 
     }
   }
   return best;
+}
+
+std::optional<Eigen::Matrix3d> bestPlane(const Correspondences& pairs, double tolerance, Rng& rng)
+{
+  RansacParams params;
+  params.inlier_threshold = tolerance;
+  params.sampling = Sampling::UNIFORM;
+  params.max_iterations = 1000;
+  const auto found = ransac(HomographyEstimator(pairs), params, rng);
+  return found.model ? std::optional<Eigen::Matrix3d>(found.model->h) : std::nullopt;
+}
+
+double significanceOffBestPlane(const Eigen::Matrix3d& f, const Correspondences& pairs, double threshold, Rng& rng)
+{
+  constexpr double SCALES[] = { 1.0, 0.5, 0.25 };  // of the threshold
+  double best = -std::numeric_limits<double>::infinity();
+  for (const double scale : SCALES)
+  {
+    const double tolerance = scale * threshold;
+    Correspondences agreeing;
+    std::copy_if(pairs.begin(), pairs.end(), std::back_inserter(agreeing),
+                 [&](const Correspondence& pair) { return sampsonError(f, pair) <= tolerance * tolerance; });
+    const auto plane = bestPlane(agreeing, 2.0 * tolerance, rng);
+    if (!plane)
+    {
+      break;
+    }
+    best = std::max(best, Parallax(*plane, pairs, tolerance).significance(f));
+  }
+  return best - std::log10(std::size(SCALES));
 }
 
 }  // namespace view_servo

@@ -216,34 +216,21 @@ public:
                                         Rng& rng) const override
   {
     constexpr int SAMPLES = 1500;
-    constexpr double SCALES[] = { 1.0, 0.5, 0.25 };  // of the threshold: exact matches show a small parallax, too
-    const double least = params_.min_log_parallax + std::log10(std::size(SCALES));
-    std::optional<Parallax> coarsest;
-    for (const double scale : SCALES)
+    const auto stands = [&](const Eigen::Matrix3d& f) {
+      return significanceOffBestPlane(f, candidates, threshold(), rng) >= params_.min_log_parallax;
+    };
+    if (stands(matrix))
     {
-      const double tolerance = scale * threshold();
-      const auto plane = bestPlane(agreeing(matrix, candidates, tolerance), 2.0 * tolerance, rng);
-      if (!plane)
-      {
-        break;
-      }
-      const Parallax parallax(*plane, candidates, tolerance);
-      if (parallax.significance(matrix) >= least)
-      {
-        return matrix;
-      }
-      if (!coarsest)
-      {
-        coarsest = parallax;
-      }
+      return matrix;
     }
-    const auto other = coarsest ? coarsest->findFundamental(SAMPLES, rng) : std::nullopt;
+    const auto plane = bestPlane(agreeing(matrix, candidates), 2.0 * threshold(), rng);
+    const auto other = plane ? Parallax(*plane, candidates, threshold()).findFundamental(SAMPLES, rng) : std::nullopt;
     if (!other)
     {
       return std::nullopt;
     }
-    const Eigen::Matrix3d refined = refine(*other, agreeing(*other, candidates, threshold()));
-    return coarsest->significance(refined) >= least ? std::optional<Eigen::Matrix3d>(refined) : std::nullopt;
+    const Eigen::Matrix3d refined = refine(*other, agreeing(*other, candidates));
+    return stands(refined) ? std::optional<Eigen::Matrix3d>(refined) : std::nullopt;
   }
 
   std::optional<Eigen::Matrix3d> mainPlane(const Eigen::Matrix3d& /*matrix*/, const Correspondences& agreeing,
@@ -300,24 +287,12 @@ private:
     return 2.0 * threshold() * diagonal;
   }
 
-  static Correspondences agreeing(const Eigen::Matrix3d& matrix, const Correspondences& pairs, double tolerance)
+  Correspondences agreeing(const Eigen::Matrix3d& matrix, const Correspondences& pairs) const
   {
     Correspondences found;
     std::copy_if(pairs.begin(), pairs.end(), std::back_inserter(found),
-                 [&](const Correspondence& pair) { return sampsonError(matrix, pair) <= tolerance * tolerance; });
+                 [&](const Correspondence& pair) { return agrees(matrix, pair); });
     return found;
-  }
-
-  /** The homography that most of the pairs agree with. */
-  std::optional<Eigen::Matrix3d> bestPlane(const Correspondences& pairs, double tolerance, Rng& rng) const
-  {
-    constexpr int MAX_ITERATIONS = 1000;
-    RansacParams params = params_.ransac;
-    params.inlier_threshold = tolerance;
-    params.sampling = Sampling::UNIFORM;
-    params.max_iterations = std::min(params.max_iterations, MAX_ITERATIONS);
-    const auto found = ransac(HomographyEstimator(pairs), params, rng);
-    return found.model ? std::optional<Eigen::Matrix3d>(found.model->h) : std::nullopt;
   }
 
   /** Largest violation of the view constraint by a sample (thesis 6.3, method 2); 0: not tested. */

@@ -85,6 +85,41 @@ TEST(Parallax, IsNotSignificantByChance)
   }
 }
 
+TEST(Parallax, TellsOffWhateverPlaneIsTheBest)
+{
+  for (std::uint64_t seed = 1; seed <= 5; ++seed)
+  {
+    Rng rng(seed);
+    const PlaneScene deep(40, 50, seed);
+    EXPECT_GT(significanceOffBestPlane(deep.scene.fundamental, deep.pairs, THRESHOLD, rng), 5.0) << seed;
+    // Any epipole agrees with what is on the plane.
+    const PlaneScene flat(0, 150, seed);
+    EXPECT_LT(significanceOffBestPlane(flat.scene.fundamental, flat.pairs, THRESHOLD, rng), 1.0) << seed;
+  }
+}
+
+TEST(Parallax, IsSeenWhereItIsSmallAndMatchesAreExact)
+{
+  // The second plane is a fiftieth farther: its parallax is below twice the threshold.
+  Rng rng(2);
+  test::SceneOptions options;
+  options.inliers = 300;
+  options.noise = 0.05;
+  options.planar = true;
+  options.shuffle = false;
+  const test::Scene scene = test::makeScene(options, rng);
+  Correspondences pairs = scene.pairs;
+  const Eigen::Vector3d epipole = currentEpipole(scene.fundamental);
+  for (int i = 0; i < 100; ++i)
+  {
+    Correspondence& pair = pairs[static_cast<std::size_t>(3 * i)];
+    const Eigen::Vector2d towards = (epipole.hnormalized() - pair.current).normalized();
+    pair.current += uniform(rng, 1.0, 2.5) * towards;
+  }
+  EXPECT_LT(Parallax(scene.homography, pairs, THRESHOLD).significance(scene.fundamental), 0.0);
+  EXPECT_GT(significanceOffBestPlane(scene.fundamental, pairs, THRESHOLD, rng), 5.0);
+}
+
 TEST(Parallax, OfAPlaneAloneIsNone)
 {
   const PlaneScene plane(0, 0, 3);

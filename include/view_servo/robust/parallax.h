@@ -50,4 +50,14 @@ private:
   std::vector<Pair> off_plane_;
 };
 
+/** The homography of the plane on which most of the pairs lie, to within `tolerance` [px]; empty when none has four. */
+std::optional<Eigen::Matrix3d> bestPlane(const Correspondences& pairs, double tolerance, Rng& rng);
+
+/**
+ * Parallax::significance() of a fundamental matrix off the plane on which most of those pairs lie that agree with it, for
+ * the best of a few tolerances up to `threshold` [px]: where matches are exact, a small parallax tells as well.
+ * @param pairs as for Parallax.
+ */
+double significanceOffBestPlane(const Eigen::Matrix3d& f, const Correspondences& pairs, double threshold, Rng& rng);
+
 }  // namespace view_servo
