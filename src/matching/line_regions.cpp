@@ -560,7 +560,7 @@ std::array<LineEvidence, LINE_DIRECTIONS> evidenceOf(const LineRegion& region, c
       seen.emplace_back(i, (mapped->end - mapped->start).normalized());
     }
   }
-  const auto countAt = [&](const std::vector<int>& of, const Eigen::Vector2d& aside) {
+  const auto count_at = [&](const std::vector<int>& of, const Eigen::Vector2d& aside) {
     Eigen::Matrix3d shift = Eigen::Matrix3d::Identity();
     shift.topRightCorner<2, 1>() = aside;
     const Eigen::Matrix3d h = shift * region.h;
@@ -586,11 +586,11 @@ std::array<LineEvidence, LINE_DIRECTIONS> evidenceOf(const LineRegion& region, c
     }
     LineEvidence& counts = evidence[axis];
     counts.seen = across.size();
-    counts.found = countAt(across, Eigen::Vector2d::Zero());
+    counts.found = count_at(across, Eigen::Vector2d::Zero());
     for (const double distance : ASIDE)
     {
       counts.tried += 2 * across.size();
-      counts.beside += countAt(across, distance * along) + countAt(across, -distance * along);
+      counts.beside += count_at(across, distance * along) + count_at(across, -distance * along);
     }
   }
   return evidence;

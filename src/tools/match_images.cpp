@@ -406,7 +406,7 @@ Camera readCamera(const std::string& option, const std::string& path, const cv::
 {
   try
   {
-    const Camera camera = readCameraFile(path);
+    Camera camera = readCameraFile(path);
     if (camera.width != image.width || camera.height != image.height)
     {
       throw std::runtime_error("'" + path + "' is of images of " + std::to_string(camera.width) + " x " +

@@ -73,7 +73,7 @@ Camera readCameraFile(const std::string& path)
       throw std::runtime_error("it is no calibration, being larger than 1 MB");
     }
     std::ifstream file(path);
-    const Camera camera = anyCameraFromYaml(YAML::Load(file));
+    Camera camera = anyCameraFromYaml(YAML::Load(file));
     const std::string fault = camera.fault();
     if (!fault.empty())
     {

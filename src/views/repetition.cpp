@@ -253,7 +253,7 @@ std::optional<Eigen::Matrix3d> otherPlace(const cv::Mat& reference, const cv::Ma
     const std::vector<Eigen::Vector2d> alike = surroundings.like(site);
     for (std::size_t i = 0; i < std::min(alike.size(), NEAREST); ++i)
     {
-      const auto other = tried.moved(h, site, alike[i]);
+      auto other = tried.moved(h, site, alike[i]);
       if (other && tried.areAlong(*other, h))
       {
         return other;
