@@ -196,12 +196,18 @@ public:
   /** The plane that corners confirm best, when it is beyond doubt and not mirrored. */
   std::optional<Eigen::Matrix3d> plane() const
   {
+    constexpr std::size_t FEWEST = 30;  // matches: a chessboard has had 21 on another picture's bricks
     const Plane* best = bestPlane();
-    if (!isBeyondDoubt(best) || !keepsOrientation(onPlane(best->h)))
+    if (!isBeyondDoubt(best))
     {
       return std::nullopt;
     }
-    return refineHomography(best->h, onPlane(best->h), HUBER_WIDTH);
+    const Correspondences on_plane = onPlane(best->h);
+    if (on_plane.size() < FEWEST || !keepsOrientation(on_plane))
+    {
+      return std::nullopt;
+    }
+    return refineHomography(best->h, on_plane, HUBER_WIDTH);
   }
 
   void reportFundamental(ViewMatch& result)
