@@ -79,9 +79,16 @@ PlaneFinder::Answer notFound(std::string reason)
   return answer;
 }
 
+/** Which of several places is meant, or that there are several, is told here. */
+PointViewMatcherParams withoutUniqueness(PointViewMatcherParams params)
+{
+  params.unique = false;
+  return params;
+}
+
 }  // namespace
 
-PlaneFinder::PlaneFinder(const PointViewMatcherParams& params) : matcher_(params)
+PlaneFinder::PlaneFinder(const PointViewMatcherParams& params) : matcher_(withoutUniqueness(params))
 {
 }
 
