@@ -430,7 +430,7 @@ std::optional<Eigen::Matrix3d> fundamentalOf(const Correspondences& points, cons
 
 constexpr std::size_t MIN_SEGMENTS = 6;
 
-/** Where the lines of neighbouring segments meet within the image. */
+/** Where the lines of neighbouring segments meet; some places lie beyond the border of the image. */
 std::vector<Corner> meetingPlaces(const LineFeatures& features)
 {
   constexpr std::size_t MOST = 1500;
