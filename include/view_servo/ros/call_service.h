@@ -10,10 +10,11 @@
 namespace view_servo
 {
 /**
- * Calls a service once; it takes as long as the service does, as roscpp knows no deadline: not for what moves a robot, and
- * where that matters from a thread of its own, as SimulatedRun does. In place of ros::service::call(), which loses a response
- * now and then: the end of its connection, which the server closes after each call, may overtake the response in roscpp
- * (ros_comm issue 1976). The connection of a persistent client stays open.
+ * Calls a service once. It takes as long as the service does, as roscpp knows no deadline: so it is not for what moves a
+ * robot, and where time matters it is called by a thread of its own, as in SimulatedRun.
+ *
+ * In place of ros::service::call(), which loses a response now and then: the end of its connection, which the server
+ * closes after each call, may overtake the response in roscpp (ros_comm issue 1976). That of a persistent client stays.
  * @param name resolved as all names of this node are.
  * @return false when the service is not there, or reports that it failed.
  */
