@@ -6,6 +6,7 @@
 #include <cmath>
 #include <locale>
 #include <regex>
+#include <set>
 #include <sstream>
 #include <stdexcept>
 
@@ -218,6 +219,30 @@ std::vector<Parameter> joined(std::initializer_list<std::vector<Parameter>> tabl
     all.insert(all.end(), table.begin(), table.end());
   }
   return all;
+}
+
+std::vector<Parameter> prefixed(const std::string& prefix, std::vector<Parameter> table)
+{
+  std::set<std::string> names;
+  for (const Parameter& parameter : table)
+  {
+    names.insert(parameter.name);
+  }
+  for (Parameter& parameter : table)
+  {
+    parameter.name.insert(0, prefix);
+    const std::regex word("[A-Za-z_][A-Za-z_0-9]*");
+    std::string range;
+    auto rest = parameter.range.cbegin();
+    for (std::sregex_iterator found(parameter.range.cbegin(), parameter.range.cend(), word), end; found != end; ++found)
+    {
+      const std::ssub_match& name = (*found)[0];
+      range.append(rest, name.first).append(names.count(name) != 0 ? prefix : "").append(name);
+      rest = name.second;
+    }
+    parameter.range = range.append(rest, parameter.range.cend());
+  }
+  return table;
 }
 
 std::vector<std::string> faultsOf(const std::vector<Parameter>& table)

@@ -110,6 +110,24 @@ TEST(Choice, ThatIsNoneOfTheWordsIsAFault)
   EXPECT_EQ(faultsOf(table).front(), "colour must be one of red|green");
 }
 
+TEST(Prefixed, RenamesParametersAlsoInRanges)
+{
+  double low = 1.0;
+  double high = 2.0;
+  int number = 5;
+  const std::vector<Parameter> table =
+      prefixed("line_", { real("low", low, "", "[0, high]", "a number"), real("high", high, "", ">= low", "a number"),
+                          integer("number", number, "", "4, 5 or 6", "a number") });
+  EXPECT_EQ(table[0].name, "line_low");
+  EXPECT_EQ(table[0].range, "[0, line_high]");
+  EXPECT_EQ(table[1].range, ">= line_low");
+  EXPECT_EQ(table[2].range, "4, 5 or 6");
+  EXPECT_TRUE(faultsOf(table).empty());
+  setParameter(table, "line_high", "0.5");
+  EXPECT_EQ(high, 0.5);
+  EXPECT_EQ(faultsOf(table).size(), 2U);
+}
+
 TEST(SetParameter, StoresTextsAndPathsAsTheyAre)
 {
   std::string text = "before";
