@@ -281,4 +281,12 @@ Eigen::Vector3d referenceEpipole(const Eigen::Matrix3d& f)
   return nullVector(f);
 }
 
+Eigen::Vector2d epipolePixel(const Eigen::Vector3d& epipole)
+{
+  constexpr double FARTHEST = 1e6;  // [px]
+  const Eigen::Vector2d at = epipole.hnormalized();
+  const bool is_near = at.norm() < FARTHEST;  // false for NaN
+  return is_near ? at : Eigen::Vector2d::Constant(std::numeric_limits<double>::quiet_NaN());
+}
+
 }  // namespace view_servo

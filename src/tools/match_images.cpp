@@ -87,7 +87,7 @@ struct Options
 {
   std::string reference;
   std::string current;
-  std::string model = "homography";
+  std::string model;
   std::string groups = "triplets";
   std::string reference_segments;
   std::string current_segments;
@@ -192,9 +192,10 @@ void writeOverlay(const std::string& path, const cv::Mat& picture)
   }
 }
 
+/** Null when it is not finite. */
 nlohmann::json toJson(const Eigen::Vector2d& point)
 {
-  return { point.x(), point.y() };
+  return point.allFinite() ? nlohmann::json{ point.x(), point.y() } : nlohmann::json();
 }
 
 nlohmann::json toJson(const Segment& segment)
@@ -421,14 +422,6 @@ Camera readCamera(const std::string& option, const std::string& path, const cv::
   }
 }
 
-/** In pixels; null where it is at infinity. */
-nlohmann::json epipoleToJson(const Eigen::Vector3d& epipole)
-{
-  constexpr double FARTHEST = 1e6;  // [px]
-  const Eigen::Vector2d at = epipole.hnormalized();
-  return at.allFinite() && at.norm() < FARTHEST ? toJson(at) : nlohmann::json();
-}
-
 nlohmann::json toJson(const SceneMotion& motion)
 {
   const Eigen::Quaterniond rotation(motion.pose.rotation);
@@ -468,7 +461,7 @@ ExitStatus matchScene(const Options& options)
     cameras[0] = readCamera("--camera-ref", options.reference_camera, reference.grey().size());
     cameras[1] = readCamera("--camera-cur", options.current_camera, current.grey().size());
   }
-  const ViewMatch match = matcher.match(reference, current);
+  const ViewMatch match = matcher.match(reference, current, MODELS.at(options.model));
   const std::optional<SceneMotion> motion =
       cameras[0] ? sceneMotion(match, *cameras[0], *cameras[1]) : std::optional<SceneMotion>();
   nlohmann::json more = {
@@ -478,8 +471,8 @@ ExitStatus matchScene(const Options& options)
   };
   if (match.outcome == MatchOutcome::MATCHED && match.model == GeometryModel::FUNDAMENTAL)
   {
-    more["epipole_reference"] = epipoleToJson(referenceEpipole(match.matrix));
-    more["epipole_current"] = epipoleToJson(currentEpipole(match.matrix));
+    more["epipole_reference"] = toJson(epipolePixel(referenceEpipole(match.matrix)));
+    more["epipole_current"] = toJson(epipolePixel(currentEpipole(match.matrix)));
   }
   const ExitStatus status = report.write(match, reference, current, more);
   if (cameras[0] && status == FOUND && !options.json)
@@ -543,12 +536,9 @@ std::optional<Options> readOptions(Subcommand subcommand, int argc, const char* 
   };
   Options options;
   CommandLine line(about.at(subcommand) + "\nREF is the stored view, CUR what the camera sees now.", STATUSES);
-  if (subcommand != Subcommand::SCENE)
-  {
-    line.choice("model", options.model, namesOf(MODELS), "homography: the scene is a plane; fundamental: it has depth");
-    line.text("truth", options.truth,
-              "File with the true homography; prints the mean error at the reference's corners");
-  }
+  options.model = subcommand == Subcommand::SCENE ? "fundamental" : "homography";
+  line.choice("model", options.model, namesOf(MODELS), "homography: the scene is a plane; fundamental: it has depth");
+  line.text("truth", options.truth, "File with the true homography; prints the mean error at the reference's corners");
   line.text("overlay", options.overlay, "Write a picture of the matches to this file");
   line.flag("json", options.json, "Print the result as one JSON object");
   line.number("threads", options.threads, { 0.0, 1024.0 }, "Threads to use; 0: one a core");

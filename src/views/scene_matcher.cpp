@@ -210,43 +210,24 @@ public:
     return refineHomography(best->h, on_plane, HUBER_WIDTH);
   }
 
-  void reportFundamental(ViewMatch& result)
+  /** @param lines those that the line matcher has found. */
+  void reportFundamental(const std::vector<MatchedLine>& lines, ViewMatch& result)
   {
     const Eigen::Matrix3d& f = *matrix_;
+    reportLines(
+        lines, [&](const Correspondence& pair) { return agrees(f, pair); }, result);
     report(result, GeometryModel::FUNDAMENTAL, f, [&](const Correspondence& pair) { return sampsonError(f, pair); });
     result.fundamental = f;
     result.log_significance = significance_;
   }
 
-  void reportPlane(const Eigen::Matrix3d& h, ViewMatch& result)
+  void reportPlane(const Eigen::Matrix3d& h, const std::vector<MatchedLine>& lines, ViewMatch& result)
   {
     const Eigen::Matrix3d inverse = h.inverse();
+    reportLines(
+        lines, [&](const Correspondence& pair) { return liesOn(h, pair); }, result);
     report(result, GeometryModel::HOMOGRAPHY, normalizedHomography(h),
            [&](const Correspondence& pair) { return 0.5 * symmetricTransferError(h, inverse, pair); });
-  }
-
-  /** Those planes of the line matcher that agree with the geometry, and the segments on them. */
-  void reportLines(const std::vector<MatchedLine>& lines, ViewMatch& result) const
-  {
-    for (const Plane& plane : planes_)
-    {
-      const Correspondences on_plane = onPlane(plane.h);
-      const auto agree = static_cast<std::size_t>(std::count_if(
-          on_plane.begin(), on_plane.end(), [&](const Correspondence& pair) { return agrees(*matrix_, pair); }));
-      if (2 * agree <= on_plane.size())
-      {
-        continue;
-      }
-      result.planes.push_back(normalizedHomography(plane.h));
-      for (const MatchedLine& line : lines)
-      {
-        if (plane.of_lines >= 0 && line.plane == plane.of_lines)
-        {
-          result.lines.push_back(line);
-          result.lines.back().plane = static_cast<int>(result.planes.size()) - 1;
-        }
-      }
-    }
   }
 
   void reportCandidates(ViewMatch& result)
@@ -442,6 +423,30 @@ private:
     }
   }
 
+  /** Those planes with whose matches the geometry mostly agrees, and the segments that the line matcher found on them. */
+  template <typename Agrees>
+  void reportLines(const std::vector<MatchedLine>& lines, const Agrees& agrees, ViewMatch& result) const
+  {
+    for (const Plane& plane : planes_)
+    {
+      const Correspondences on_plane = onPlane(plane.h);
+      const auto agree = static_cast<std::size_t>(std::count_if(on_plane.begin(), on_plane.end(), agrees));
+      if (2 * agree <= on_plane.size())
+      {
+        continue;
+      }
+      result.planes.push_back(normalizedHomography(plane.h));
+      for (const MatchedLine& line : lines)
+      {
+        if (plane.of_lines >= 0 && line.plane == plane.of_lines)
+        {
+          result.lines.push_back(line);
+          result.lines.back().plane = static_cast<int>(result.planes.size()) - 1;
+        }
+      }
+    }
+  }
+
   template <typename SquaredError>
   void report(ViewMatch& result, GeometryModel model, const Eigen::Matrix3d& matrix, const SquaredError& squared_error)
   {
@@ -495,7 +500,7 @@ std::vector<Parameter> sceneParameters(SceneMatcherParams& params)
 
 std::vector<Parameter> parameters(SceneMatcherParams& params)
 {
-  return joined({ parameters(params.points), sceneParameters(params) });
+  return joined({ parameters(params.points), prefixed("line_", parameters(params.lines)), sceneParameters(params) });
 }
 
 std::vector<std::string> SceneMatcherParams::validate() const
@@ -503,7 +508,7 @@ std::vector<std::string> SceneMatcherParams::validate() const
   SceneMatcherParams copy = *this;
   Faults faults;
   faults.add(points.validate());
-  faults.add(lines.validate());
+  faults.add(faultsOf(prefixed("line_", parameters(copy.lines))));
   faults.add(faultsOf(sceneParameters(copy)));
   return faults.list();
 }
@@ -522,10 +527,11 @@ FeatureParams SceneMatcher::features() const
   return features;
 }
 
-ViewMatch SceneMatcher::match(const PreparedImage& reference, const PreparedImage& current) const
+ViewMatch SceneMatcher::match(const PreparedImage& reference, const PreparedImage& current, GeometryModel model,
+                              const std::function<bool()>& given_up) const
 {
   ViewMatch result;
-  result.model = GeometryModel::FUNDAMENTAL;
+  result.model = model;
   result.matrix.setConstant(NOT_A_NUMBER);
   result.rms_error = NOT_A_NUMBER;
   StageClock clock(result.stages);
@@ -535,7 +541,7 @@ ViewMatch SceneMatcher::match(const PreparedImage& reference, const PreparedImag
   // Other scales are for where nothing else is.
   int trials = 0;
   const auto enough = [&] {
-    return !lines.planes.empty() && ++trials > 2;
+    return (given_up && given_up()) || (!lines.planes.empty() && ++trials > 2);
   };
   // Matches that were sought along one geometry would speak for that geometry.
   PointViewMatcherParams point_params = params_.points;
@@ -543,6 +549,12 @@ ViewMatch SceneMatcher::match(const PreparedImage& reference, const PreparedImag
   const ViewMatch points =
       PointViewMatcher(point_params).match(reference, current, GeometryModel::FUNDAMENTAL, 0.0, enough);
   clock.finish("points");
+  if (given_up && given_up())
+  {
+    result.message = "given up";
+    result.elapsed_ms = clock.total();
+    return result;
+  }
 
   Attempt attempt(reference, current, params_);
   for (std::size_t i = 0; i < lines.planes.size(); ++i)
@@ -558,6 +570,7 @@ ViewMatch SceneMatcher::match(const PreparedImage& reference, const PreparedImag
   attempt.collect(lines.matches, points.matches);
   const bool points_agree = points.outcome == MatchOutcome::MATCHED;
   const bool found =
+      model == GeometryModel::FUNDAMENTAL &&
       attempt.fit(points_agree ? std::optional<Eigen::Matrix3d>(points.matrix) : std::nullopt, result.ransac);
   clock.finish("fundamental");
 
@@ -566,12 +579,11 @@ ViewMatch SceneMatcher::match(const PreparedImage& reference, const PreparedImag
   clock.finish("unique");
   if (found && !repeated)
   {
-    attempt.reportFundamental(result);
-    attempt.reportLines(lines.lines, result);
+    attempt.reportFundamental(lines.lines, result);
   }
   else if (plane && !repeated)
   {
-    attempt.reportPlane(*plane, result);
+    attempt.reportPlane(*plane, lines.lines, result);
   }
   attempt.reportCandidates(result);
   const std::string count = std::to_string(result.inliers) + " of " + std::to_string(result.matches.size());
@@ -586,7 +598,8 @@ ViewMatch SceneMatcher::match(const PreparedImage& reference, const PreparedImag
   }
   else if (plane)
   {
-    result.message = count + " points lie on one plane, and too little beside it: a homography";
+    result.message = count + " points lie on one plane" +
+                     (model == GeometryModel::FUNDAMENTAL ? ", and too little beside it: a homography" : "");
   }
   else if (points.outcome == MatchOutcome::TOO_FEW_FEATURES && lines.outcome == MatchOutcome::TOO_FEW_FEATURES)
   {

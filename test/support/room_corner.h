@@ -18,7 +18,7 @@ namespace view_servo
 namespace test
 {
 /** What another camera sees of a plane; grey beside it. @param h image -> result [px]. */
-inline cv::Mat warped(const cv::Mat& image, const Eigen::Matrix3d& h)
+inline cv::Mat viewThrough(const cv::Mat& image, const Eigen::Matrix3d& h)
 {
   cv::Mat matrix;
   cv::eigen2cv(h, matrix);
@@ -66,8 +66,8 @@ struct RoomCorner
     cv::Mat matrix;
     cv::eigen2cv(right, matrix);
     cv::warpPerspective(mask, seen_mask, matrix, PICTURE_SIZE, cv::INTER_NEAREST);
-    current = warped(texture_left, left);
-    warped(texture_right, right).copyTo(current, seen_mask);
+    current = viewThrough(texture_left, left);
+    viewThrough(texture_right, right).copyTo(current, seen_mask);
   }
 };
 

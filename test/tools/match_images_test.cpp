@@ -273,7 +273,9 @@ TEST_F(MatchImages, MatchesAScene)
 
   EXPECT_EQ(run({ "scene", reference_, write("other.png", texture(9)) }).status, 1);
   EXPECT_EQ(run({ "scene", reference_, current_, "--set", "scene_threshold=1.5" }).status, 0);
-  EXPECT_EQ(run({ "scene", reference_, current_, "--model", "homography" }).status, 2) << "it finds out by itself";
+  const json plane = json::parse(run({ "scene", reference_, current_, "--model", "homography", "--json" }).out);
+  EXPECT_EQ(plane.at("model"), "homography");
+  EXPECT_EQ(plane.at("success"), true) << plane.at("message");
 }
 
 TEST_F(MatchImages, TellsTheMotionInASceneOfKnownCameras)

@@ -3,6 +3,7 @@
 #include "view_servo/parameters/parameter.h"
 #include "view_servo/views/line_view_matcher.h"
 #include "view_servo/views/point_view_matcher.h"
+#include "view_servo/views/scene_matcher.h"
 
 #include <gtest/gtest.h>
 
@@ -17,6 +18,7 @@ namespace
 using view_servo::LineMatcherParams;
 using view_servo::Parameter;
 using view_servo::PointViewMatcherParams;
+using view_servo::SceneMatcherParams;
 using view_servo::setParameter;
 
 template <typename Params>
@@ -24,7 +26,7 @@ class MatcherParameters : public ::testing::Test
 {
 };
 
-using Matchers = ::testing::Types<PointViewMatcherParams, LineMatcherParams>;
+using Matchers = ::testing::Types<PointViewMatcherParams, LineMatcherParams, SceneMatcherParams>;
 TYPED_TEST_SUITE(MatcherParameters, Matchers, );
 
 TYPED_TEST(MatcherParameters, HaveUniqueDocumentedNames)

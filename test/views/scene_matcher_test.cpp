@@ -69,10 +69,39 @@ TEST(SceneMatcher, SaysThatAPlaneIsOne)
 {
   const Eigen::Matrix3d h = test::exampleHomography();
   const cv::Mat reference = test::texturedPicture(5, test::PICTURE_SIZE);
-  const ViewMatch result = match(reference, test::warped(reference, h));
+  const ViewMatch result = match(reference, test::viewThrough(reference, h));
   ASSERT_EQ(result.outcome, MatchOutcome::MATCHED) << result.message;
   EXPECT_EQ(result.model, GeometryModel::HOMOGRAPHY) << result.message;
   EXPECT_LT(test::cornerError(result.matrix, h, test::PICTURE_SIZE), 0.5);
+}
+
+TEST(SceneMatcher, FindsTheBestPlaneWhereAHomographyIsAskedFor)
+{
+  const test::RoomCorner room;
+  const SceneMatcher matcher{ SceneMatcherParams() };
+  const PreparedImage reference(room.reference, cv::Rect(), matcher.features());
+  const PreparedImage current(room.current, cv::Rect(), matcher.features());
+  const ViewMatch result = matcher.match(reference, current, GeometryModel::HOMOGRAPHY);
+  ASSERT_EQ(result.outcome, MatchOutcome::MATCHED) << result.message;
+  EXPECT_EQ(result.model, GeometryModel::HOMOGRAPHY);
+  const cv::Size half(test::PICTURE_SIZE.width / 2, test::PICTURE_SIZE.height);
+  const Eigen::Matrix3d to_right = (Eigen::Matrix3d() << 1.0, 0.0, half.width, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0).finished();
+  const double left_error = test::cornerError(result.matrix, room.left, half);
+  const double right_error = test::cornerError(result.matrix * to_right, room.right * to_right, half);
+  EXPECT_LT(std::min(left_error, right_error), 1.0);
+  EXPECT_FALSE(result.lines.empty());
+}
+
+TEST(SceneMatcher, EndsEarlyWhenGivenUp)
+{
+  const test::RoomCorner room;
+  const SceneMatcher matcher{ SceneMatcherParams() };
+  const PreparedImage reference(room.reference, cv::Rect(), matcher.features());
+  const PreparedImage current(room.current, cv::Rect(), matcher.features());
+  const ViewMatch result = matcher.match(reference, current, GeometryModel::FUNDAMENTAL, [] { return true; });
+  EXPECT_EQ(result.outcome, MatchOutcome::NO_GEOMETRY);
+  EXPECT_EQ(result.message, "given up");
+  EXPECT_TRUE(result.matrix.hasNaN());
 }
 
 TEST(SceneMatcher, FindsNothingInUnrelatedPictures)

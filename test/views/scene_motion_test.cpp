@@ -69,7 +69,7 @@ TEST(SceneMotion, HasACovarianceThatIsOne)
 TEST(SceneMotion, IsNotToldOfAPlane)
 {
   const cv::Mat picture = test::texturedPicture(4, test::PICTURE_SIZE);
-  const ViewMatch match = matchScene(picture, test::warped(picture, test::exampleHomography()));
+  const ViewMatch match = matchScene(picture, test::viewThrough(picture, test::exampleHomography()));
   ASSERT_EQ(match.model, GeometryModel::HOMOGRAPHY);
   EXPECT_FALSE(sceneMotion(match, cameraOfTheRoom(), cameraOfTheRoom()));
   EXPECT_FALSE(sceneMotion(ViewMatch(), cameraOfTheRoom(), cameraOfTheRoom()));

@@ -47,4 +47,7 @@ Eigen::Vector3d currentEpipole(const Eigen::Matrix3d& f);
 /** Epipole in the reference image (right null vector of F, homogeneous, unit norm). */
 Eigen::Vector3d referenceEpipole(const Eigen::Matrix3d& f);
 
+/** Pixel of a homogeneous epipole; NaN when it lies farther than 10^6 px off, which is as good as at infinity. */
+Eigen::Vector2d epipolePixel(const Eigen::Vector3d& epipole);
+
 }  // namespace view_servo

@@ -9,6 +9,7 @@
 #include "view_servo/views/view_match.h"
 
 #include <cstdint>
+#include <functional>
 #include <string>
 #include <vector>
 
@@ -33,7 +34,7 @@ struct SceneMatcherParams
 /** Names, units and ranges of the parameters of this stage alone, by which validate() checks them. */
 std::vector<Parameter> sceneParameters(SceneMatcherParams& params);
 
-/** The same with those of points; the names of lines would be there twice. */
+/** The same with those of points and, as `line_...`, of lines: many names of the two are the same. */
 std::vector<Parameter> parameters(SceneMatcherParams& params);
 
 /**
@@ -63,8 +64,11 @@ public:
    * In the result, `model` says what was found: FUNDAMENTAL, or HOMOGRAPHY where nothing off one plane tells more, and
    * `matrix` is that one. `matches` are corners and intersections, best first; `lines` the segments matched on planes
    * that agree; `planes` the homographies of these planes.
+   * @param model HOMOGRAPHY: the plane that is confirmed best, also where there is more than one.
+   * @param given_up asked now and then; once it is true, the match ends without a geometry.
    */
-  ViewMatch match(const PreparedImage& reference, const PreparedImage& current) const;
+  ViewMatch match(const PreparedImage& reference, const PreparedImage& current,
+                  GeometryModel model = GeometryModel::FUNDAMENTAL, const std::function<bool()>& given_up = {}) const;
 
 private:
   SceneMatcherParams params_;
