@@ -36,6 +36,7 @@ class LineMatching
 public:
   using Params = LineMatcherParams;
   using Service = MatchLines;
+  using Result = ViewMatch;
   using Message = LineMatches;
   struct Options
   {
@@ -64,13 +65,13 @@ public:
     return { toGrouping(request.groups) };
   }
 
-  ViewMatch match(const PreparedImage& reference, const PreparedImage& current, const Options& options,
-                  const std::function<bool()>& /*given_up*/) const
+  Result match(const MatchedImage& reference, const MatchedImage& current, const Options& options,
+               const std::function<bool()>& /*given_up*/) const
   {
-    return matcher_.match(reference, current, GeometryModel::HOMOGRAPHY, options.groups);
+    return matcher_.match(*reference.image, *current.image, GeometryModel::HOMOGRAPHY, options.groups);
   }
 
-  static void fill(const ViewMatch& result, Service::Response& response)
+  static void fill(const Result& result, Service::Response& response)
   {
     response.matches = toLineMatches(result.lines);
     response.points = toPointMatches(result.matches);
@@ -78,7 +79,7 @@ public:
     copyRowMajor(result.fundamental, response.fundamental);
   }
 
-  static Message toMessage(const ViewMatch& result, const MatchLabel& label)
+  static Message toMessage(const Result& result, const MatchLabel& label)
   {
     Message message;
     message.header = label.header;

@@ -36,6 +36,7 @@ class PointMatching
 public:
   using Params = PointViewMatcherParams;
   using Service = MatchPoints;
+  using Result = ViewMatch;
   using Message = PointMatches;
   struct Options
   {
@@ -72,13 +73,13 @@ public:
     return options;
   }
 
-  ViewMatch match(const PreparedImage& reference, const PreparedImage& current, const Options& options,
-                  const std::function<bool()>& given_up) const
+  Result match(const MatchedImage& reference, const MatchedImage& current, const Options& options,
+               const std::function<bool()>& given_up) const
   {
-    return matcher_.match(reference, current, options.model, options.inlier_threshold, given_up);
+    return matcher_.match(*reference.image, *current.image, options.model, options.inlier_threshold, given_up);
   }
 
-  static void fill(const ViewMatch& result, Service::Response& response)
+  static void fill(const Result& result, Service::Response& response)
   {
     response.matches = toPointMatches(result.matches);
     if (result.outcome == MatchOutcome::MATCHED)
@@ -89,7 +90,7 @@ public:
     }
   }
 
-  static Message toMessage(const ViewMatch& result, const MatchLabel& label)
+  static Message toMessage(const Result& result, const MatchLabel& label)
   {
     Message message;
     message.header = label.header;

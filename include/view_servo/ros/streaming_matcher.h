@@ -4,6 +4,7 @@
 
 #include "view_servo/ImageSource.h"
 #include "view_servo/SetView.h"
+#include "view_servo/geometry/camera.h"
 #include "view_servo/ros/camera_input.h"
 #include "view_servo/ros/conversions.h"
 #include "view_servo/ros/image_source.h"
@@ -11,7 +12,6 @@
 #include "view_servo/ros/parameters.h"
 #include "view_servo/ros/view_choice.h"
 #include "view_servo/views/overlay.h"
-#include "view_servo/views/point_view_matcher.h"
 #include "view_servo/views/prepared_image.h"
 #include "view_servo/views/view_cache.h"
 #include "view_servo/views/view_match.h"
@@ -24,6 +24,7 @@
 #include <ros/time.h>
 #include <sensor_msgs/image_encodings.h>
 #include <std_msgs/Header.h>
+#include <opencv2/core/mat.hpp>
 #include <opencv2/core/types.hpp>
 
 #include <atomic>
@@ -54,6 +55,14 @@ struct StreamingMatcherParams
 
 /** Names, units, ranges and meanings of these parameters. */
 std::vector<Parameter> parameters(StreamingMatcherParams& params);
+
+/** One of two images that are matched. */
+struct MatchedImage
+{
+  std::shared_ptr<const PreparedImage> image;
+  std_msgs::Header header;       ///< stamp and camera's frame; empty for a stored view and for a file
+  std::optional<Camera> camera;  ///< its calibration; empty where the source has none
+};
 
 /** What a message about a view says besides the match. */
 struct MatchLabel
@@ -88,13 +97,15 @@ struct MatchLabel
  *    is published on `~TOPIC`; the default `RATE` [Hz];
  *  - `Params`, with their table parameters(Params&) and validate(), a constructor that takes those, and
  *    `FeatureParams features() const`;
+ *  - `Result`, a ViewMatch, which may have more than that;
  *  - `static void clear(Service::Response&)`, which sets what a refused request leaves unknown;
  *  - `static Options options(const Service::Request&)`, which throws when the request makes no sense;
- *  - `ViewMatch match(const PreparedImage& reference, const PreparedImage& current, const Options&, given_up) const`,
- *    which ends early, if it can, once `given_up()` holds;
- *  - `static void fill(const ViewMatch&, Service::Response&)`, for the fields that are the service's own;
- *  - `static Message toMessage(const ViewMatch&, const MatchLabel&)`, whose reason is the match's message when nothing
- *    was found.
+ *  - `Result match(const MatchedImage& reference, const MatchedImage& current, const Options&, given_up) const`, which
+ *    ends early, if it can, once `given_up()` holds;
+ *  - `static void fill(const Result&, Service::Response&)`, for the fields that are the service's own; success and
+ *    message are set before, and may be changed;
+ *  - `static Message toMessage(const Result&, const MatchLabel&)`, whose reason is the match's message when nothing was
+ *    found.
  */
 template <typename Matching>
 class StreamingMatcher : private NodeBase
@@ -145,15 +156,8 @@ private:
     return params;
   }
 
-  /** An image of a request; the header is empty for a stored view. */
-  struct RequestedImage
-  {
-    std::shared_ptr<const PreparedImage> image;
-    std_msgs::Header header;
-  };
-
   /** What diagnostics report of the last image. */
-  struct Result
+  struct LastResult
   {
     bool failed = false;
     std::string text = "no image was matched";
@@ -190,9 +194,9 @@ private:
   {
     Matching::clear(response);
     const typename Matching::Options options = Matching::options(request);
-    const RequestedImage reference = prepare(request.reference, "reference");
-    const RequestedImage query = prepare(request.query, "query");
-    const ViewMatch result = matching_.match(*reference.image, *query.image, options, given_up_);
+    const MatchedImage reference = prepare(request.reference, "reference");
+    const MatchedImage query = prepare(request.query, "query");
+    const typename Matching::Result result = matching_.match(reference, query, options, given_up_);
 
     if (request.overlay)
     {
@@ -205,15 +209,21 @@ private:
   }
 
   /** The image of a request; a stored view comes from the cache, with what was computed for it before. */
-  RequestedImage prepare(const ImageSource& source, const std::string& name)
+  MatchedImage prepare(const ImageSource& source, const std::string& name)
   {
     const SourceKind kind = kindOf(source, name);
     if (kind == SourceKind::VIEW)
     {
-      return { views_.get(source.view).image, std_msgs::Header() };
+      return viewImage(source.view);
     }
     const SourcedImage image = sources_.read(kind, source, name);
-    return { std::make_shared<const PreparedImage>(image.grey, image.region, features_), image.header };
+    return { std::make_shared<const PreparedImage>(image.grey, image.region, features_), image.header, image.camera };
+  }
+
+  MatchedImage viewImage(const std::string& name)
+  {
+    const CachedView view = views_.get(name);
+    return { view.image, std_msgs::Header(), view.stored.camera };
   }
 
   static sensor_msgs::Image overlay(const PreparedImage& reference, const PreparedImage& current,
@@ -253,7 +263,7 @@ private:
   void onChoice()
   {
     newest_.reset();  // it may be old
-    last_result_ = Result();
+    last_result_ = LastResult();
     renewed_ = true;
     wake_.notify_all();
   }
@@ -288,13 +298,13 @@ private:
       const std::optional<CameraFrame> frame = std::exchange(newest_, std::nullopt);
       const Clock::time_point next = Clock::now() + period;
       lock.unlock();
-      Result result;
+      LastResult result;
       const std::string fault =
           guarded("matching", [&] { result = frame ? matchFrame(*frame, chosen) : check(chosen); });
       lock.lock();
       if (!renewed_)
       {
-        last_result_ = fault.empty() ? result : Result{ true, fault };
+        last_result_ = fault.empty() ? result : LastResult{ true, fault };
       }
       if (frame)
       {
@@ -304,12 +314,12 @@ private:
   }
 
   /** Whether a view can be matched, as far as is known without an image. */
-  Result check(const ChosenView& chosen)
+  LastResult check(const ChosenView& chosen)
   {
     try
     {
       views_.get(chosen.view);
-      return Result();
+      return LastResult();
     }
     catch (const std::exception& error)
     {
@@ -319,24 +329,27 @@ private:
     }
   }
 
-  Result matchFrame(const CameraFrame& frame, const ChosenView& chosen)
+  LastResult matchFrame(const CameraFrame& frame, const ChosenView& chosen)
   {
     MatchLabel label{ frame.image->header, chosen, true };
     try
     {
-      const std::shared_ptr<const PreparedImage> reference = views_.get(chosen.view).image;
+      const MatchedImage reference = viewImage(chosen.view);
       label.refused = false;
       const bool wants_overlay = overlay_publisher_.getNumSubscribers() > 0;
       if (!wants_overlay && matches_publisher_.getNumSubscribers() == 0)
       {
         return { false, "nobody listens" };
       }
-      const PreparedImage current(toGrey(*frame.image, camera_.imageTopic()), cv::Rect(), features_);
-      const ViewMatch result = matching_.match(*reference, current, typename Matching::Options(), given_up_);
+      const cv::Mat grey = toGrey(*frame.image, camera_.imageTopic());
+      const MatchedImage current{ std::make_shared<const PreparedImage>(grey, cv::Rect(), features_), label.header,
+                                  toCamera(*frame.info) };
+      const typename Matching::Result result =
+          matching_.match(reference, current, typename Matching::Options(), given_up_);
       matches_publisher_.publish(Matching::toMessage(result, label));
       if (wants_overlay)
       {
-        overlay_publisher_.publish(overlay(*reference, current, result, label.header));
+        overlay_publisher_.publish(overlay(*reference.image, *current.image, result, label.header));
       }
       return { false, result.message };
     }
@@ -346,9 +359,9 @@ private:
     }
   }
 
-  Result publishFailure(const MatchLabel& label, const std::string& reason)
+  LastResult publishFailure(const MatchLabel& label, const std::string& reason)
   {
-    ViewMatch nothing;
+    typename Matching::Result nothing;
     nothing.message = reason;
     matches_publisher_.publish(Matching::toMessage(nothing, label));
     ROS_ERROR_STREAM_THROTTLE(10.0, "camera images are not matched: " << reason);
@@ -375,7 +388,7 @@ private:
   ViewChoice choice_;
   bool renewed_ = false;  // the choice, since the worker has looked
   std::optional<CameraFrame> newest_;
-  Result last_result_;
+  LastResult last_result_;
   std::atomic<bool> stopping_{ false };
   const std::function<bool()> given_up_ = [this] {
     return stopping_ || !ros::ok();
