@@ -35,6 +35,7 @@ class Tables
 public:
   StreamingMatcherParams points_node;
   StreamingMatcherParams lines_node;
+  StreamingMatcherParams scene_node;
   PointViewMatcherParams points;
   LineMatcherParams lines;
   SceneMatcherParams scene;
@@ -46,6 +47,7 @@ public:
   Tables()
   {
     lines_node.rate = 10.0;
+    scene_node.rate = 2.0;
   }
 
   /** Titles and tables of a file in config/. */
@@ -60,6 +62,9 @@ public:
       { "line_matcher",
         { { "the node", parameters(lines_node) },
           { "matching; these are also names of `match_images lines --set name=value`", parameters(lines) } } },
+      { "scene_matcher",
+        { { "the node", parameters(scene_node) },
+          { "matching; these are also names of `match_images scene --set name=value`", parameters(scene) } } },
       { "homing", { { "the node, homing and the base", parameters(homing) } } },
       { "homography_tracker", { { "the node and tracking", parameters(tracker) } } },
       { "servo_25d", { { "the node, servoing and the camera's motion", parameters(servo) } } },
@@ -232,6 +237,7 @@ TEST(Config, DefaultsAreValidAndNamesUnique)
   EXPECT_EQ(tables.points_node.validate(), std::vector<std::string>());
   EXPECT_EQ(tables.points.validate(), std::vector<std::string>());
   EXPECT_EQ(tables.lines.validate(), std::vector<std::string>());
+  EXPECT_EQ(tables.scene.validate(), std::vector<std::string>());
   EXPECT_EQ(tables.homing.validate(), std::vector<std::string>());
   EXPECT_EQ(tables.tracker.validate(), std::vector<std::string>());
   EXPECT_EQ(tables.servo.validate(), std::vector<std::string>());

@@ -153,7 +153,8 @@ class AwkwardOrder(graph.GraphTest):
 
     def test_matching(self):
         self.start_all_before_the_camera("matching.launch", [],
-                                         ["/view_store/save", "/line_matcher/match", "/point_matcher/match"])
+                                         ["/view_store/save", "/line_matcher/match", "/point_matcher/match",
+                                          "/scene_matcher/match"])
 
     def test_homing(self):
         self.start_all_before_the_camera("homing.launch", ["sim:=false"], ["/view_store/save", "/homing/enable"])

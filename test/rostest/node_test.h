@@ -7,6 +7,7 @@
 #include "view_servo/Homography.h"
 #include "view_servo/LineMatches.h"
 #include "view_servo/PointMatches.h"
+#include "view_servo/SceneMatches.h"
 #include "view_servo/ServoStatus.h"
 #include "view_servo/ros/conversions.h"
 
@@ -107,6 +108,10 @@ inline bool givesReason(const PointMatches& message)
 inline bool givesReason(const LineMatches& message)
 {
   return !message.matches.empty() || !message.reason.empty();
+}
+inline bool givesReason(const SceneMatches& message)
+{
+  return !message.found.empty() || !message.reason.empty();
 }
 inline bool givesReason(const ServoStatus& message)
 {
