@@ -341,7 +341,7 @@ int tilt(const PointViewMatcherParams& params)
     { "SIFT 500", runSift },
     { "AKAZE", runAkaze },
   };
-  const std::vector<int> angles = { 0, 30, 45, 50, 55, 60, 65, 70, 75, 80 };
+  const std::vector<int> angles = { 0, 30, 45, 50, 55, 60, 65, 70, 75, 80, 82, 84 };
   std::vector<std::vector<int>> solved(pipelines.size(), std::vector<int>(angles.size(), 0));
   std::vector<std::vector<int>> sums(pipelines.size(), std::vector<int>(angles.size(), 0));
   int problems = 0;

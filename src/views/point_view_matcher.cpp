@@ -14,9 +14,11 @@
 
 #include <algorithm>
 #include <cmath>
+#include <functional>
 #include <iterator>
 #include <limits>
 #include <memory>
+#include <numeric>
 #include <optional>
 #include <stdexcept>
 #include <utility>
@@ -68,6 +70,85 @@ std::vector<LevelTrial> levelTrials(const PointViewMatcherParams& params)
   }
   return result;
 }
+
+/**
+ * How much better the best associations of some reference corners are than their second best, summed up over the corners
+ * where this is most: where two images show the same, a few associations stand out, however many corners there are.
+ */
+double distinctness(const AssociationMatrix& association, std::size_t rows)
+{
+  constexpr std::size_t MOST = 30;
+  std::vector<double> best(rows, 0.0);
+  std::vector<double> second(rows, 0.0);
+  for (const Association& entry : association.entries())
+  {
+    const auto row = static_cast<std::size_t>(entry.row);
+    second[row] = std::max(second[row], std::min(best[row], entry.weight));
+    best[row] = std::max(best[row], entry.weight);
+  }
+  std::transform(best.begin(), best.end(), second.begin(), best.begin(), std::minus<>());
+  const auto most = best.begin() + static_cast<std::ptrdiff_t>(std::min(MOST, rows));
+  std::partial_sort(best.begin(), most, best.end(), std::greater<>());
+  return std::accumulate(best.begin(), most, 0.0);
+}
+
+/** The levels of the sides from which the current image may show the reference, as far as a few profiles tell. */
+std::vector<int> promisingSides(const PreparedImage& reference, const PreparedImage& current, PointMatcherParams params)
+{
+  constexpr double SHARE = 0.2;  // of the profiles
+  constexpr std::size_t MOST = 2;
+  params.search.share *= SHARE;
+  std::vector<std::pair<double, int>> sides;
+  for (int level = PreparedImage::SCALES; level < PreparedImage::LEVELS; ++level)
+  {
+    const PointFeatures& from = reference.points(level);
+    if (from.corners.size() >= MIN_CORNERS && current.points(0).corners.size() >= MIN_CORNERS)
+    {
+      const AssociationMatrix association =
+          associatePoints(from, reference.profileIndex(level), current.points(0), params);
+      sides.emplace_back(distinctness(association, from.corners.size()), level);
+    }
+  }
+  std::sort(sides.rbegin(), sides.rend());
+  std::vector<int> levels;
+  for (std::size_t i = 0; i < std::min(MOST, sides.size()); ++i)
+  {
+    levels.push_back(sides[i].second);
+  }
+  return levels;
+}
+
+/** What to compare, one after the other. Which sides to try is only found out when nothing else has helped. */
+class TrialQueue
+{
+public:
+  TrialQueue(const PreparedImage& reference, const PreparedImage& current, const PointViewMatcherParams& params)
+    : reference_(reference), current_(current), params_(params), trials_(levelTrials(params))
+  {
+  }
+
+  /** The next one; empty when there is none. */
+  std::optional<LevelTrial> next()
+  {
+    if (given_ == trials_.size() && params_.side_search && !sides_chosen_)
+    {
+      sides_chosen_ = true;
+      for (const int side : promisingSides(reference_, current_, params_.points))
+      {
+        trials_.push_back({ { side, 0 }, params_.points.search.share, params_.min_log_significance });
+      }
+    }
+    return given_ < trials_.size() ? std::optional<LevelTrial>(trials_[given_++]) : std::nullopt;
+  }
+
+private:
+  const PreparedImage& reference_;
+  const PreparedImage& current_;
+  const PointViewMatcherParams& params_;
+  std::vector<LevelTrial> trials_;
+  std::size_t given_ = 0;
+  bool sides_chosen_ = false;
+};
 
 Points positions(const std::vector<Corner>& corners)
 {
@@ -344,6 +425,8 @@ std::vector<Parameter> parameters(PointViewMatcherParams& params)
           real("first_share", params.first_share, "", "(0, 1]",
                "part of the profiles that votes at first; all do if it is too little"),
           boolean("scale_search", params.scale_search, "try other scales when the first finds no geometry"),
+          boolean("side_search", params.side_search,
+                  "then try the reference as it would look from the sides, very obliquely"),
           real("min_significance", params.min_log_significance, "", ">= 0",
                "-log10 of the false alarms a geometry may have"),
           boolean("unique", params.unique, "refuse a view that fits at another place nearly as well"),
@@ -390,18 +473,19 @@ ViewMatch PointViewMatcher::match(const PreparedImage& reference, const Prepared
   bool ended_early = false;
   bool left_open = false;
   bool repeated = false;
-  for (const LevelTrial& trial : levelTrials(params_))
+  TrialQueue trials(reference, current, params_);
+  while (!(ended_early = given_up && given_up()))
   {
-    ended_early = given_up && given_up();
-    if (ended_early)
+    const std::optional<LevelTrial> trial = trials.next();
+    if (!trial)
     {
       break;
     }
-    reference.profileIndex(trial.levels.reference);
+    reference.profileIndex(trial->levels.reference);
     clock.finish("reference");
-    current.points(trial.levels.current);
+    current.points(trial->levels.current);
     clock.finish("current");
-    Attempt attempt(reference, current, trial, *geometry, params_);
+    Attempt attempt(reference, current, *trial, *geometry, params_);
     if (!attempt.hasFeatures())
     {
       continue;
@@ -419,13 +503,13 @@ ViewMatch PointViewMatcher::match(const PreparedImage& reference, const Prepared
       accepted = !repeated;
       clock.finish("unique");
     }
-    if (accepted || (trial.levels.reference == 0 && trial.levels.current == 0))
+    if (accepted || (trial->levels.reference == 0 && trial->levels.current == 0))
     {
       // Without a geometry, the candidates of the full images are reported.
       attempt.report(accepted, result);
     }
     left_open = attempt.leftOpen();
-    if (accepted || repeated || (left_open && trial.share == params_.points.search.share))
+    if (accepted || repeated || (left_open && trial->share == params_.points.search.share))
     {
       break;  // what repeats itself at this scale, or lies on one plane, does at others
     }

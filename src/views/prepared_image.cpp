@@ -8,6 +8,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <stdexcept>
 #include <utility>
 
@@ -15,8 +16,9 @@ namespace view_servo
 {
 namespace
 {
-constexpr int MIN_SIDE = 64;  // of a reduced image [px]
-}
+constexpr int MIN_SIDE = 64;   // of a reduced image [px]
+constexpr int MIN_WIDTH = 32;  // of an image from the side, which is compressed in one direction only [px]
+}  // namespace
 
 PreparedImage::PreparedImage(cv::Mat grey, const cv::Rect& region, const FeatureParams& params)
   : grey_(std::move(grey)), region_(region), params_(params)
@@ -45,33 +47,91 @@ const cv::Mat& PreparedImage::image(int number) const
 {
   Level& wanted = level(number);
   std::call_once(wanted.image_once, [&] {
-    if (number == 0)
+    if (number < SCALES)
     {
-      wanted.image = grey_;
-      return;
+      reduce(wanted, number);
     }
-    const double scale = std::pow(2.0, -0.5 * number);
-    const cv::Size size(static_cast<int>(std::lround(grey_.cols * scale)),
-                        static_cast<int>(std::lround(grey_.rows * scale)));
-    if (std::min(size.width, size.height) >= MIN_SIDE)
+    else
     {
-      cv::resize(grey_, wanted.image, size, 0.0, 0.0, cv::INTER_AREA);
+      lookFromSide(wanted, number - SCALES);
     }
   });
   return wanted.image;
 }
 
+void PreparedImage::reduce(Level& wanted, int number) const
+{
+  wanted.to_full.setIdentity();
+  if (number == 0)
+  {
+    wanted.image = grey_;
+    return;
+  }
+  const double scale = std::pow(2.0, -0.5 * number);
+  const cv::Size size(static_cast<int>(std::lround(grey_.cols * scale)),
+                      static_cast<int>(std::lround(grey_.rows * scale)));
+  if (std::min(size.width, size.height) < MIN_SIDE)
+  {
+    return;
+  }
+  cv::resize(grey_, wanted.image, size, 0.0, 0.0, cv::INTER_AREA);
+  const double sx = static_cast<double>(grey_.cols) / size.width;
+  const double sy = static_cast<double>(grey_.rows) / size.height;
+  // The image's edge is half a pixel before the centre of its first pixel.
+  wanted.to_full << sx, 0.0, 0.5 * (sx - 1.0), 0.0, sy, 0.5 * (sy - 1.0), 0.0, 0.0, 1.0;
+}
+
+void PreparedImage::lookFromSide(Level& wanted, int side) const
+{
+  constexpr int EDGE = 4;  // of the picture within the level, which shows no corner of the scene [px]
+  wanted.to_full.setIdentity();
+  // Turned so that the direction of compression is the horizontal one, with the region's bounding box from (0, 0) on.
+  const double angle = M_PI * side / SIDES;
+  Eigen::Matrix2d turn;
+  turn << std::cos(angle), std::sin(angle), -std::sin(angle), std::cos(angle);
+  const Eigen::Vector2d first(region_.x, region_.y);
+  const Eigen::Vector2d extent(region_.width - 1.0, region_.height - 1.0);
+  Eigen::Vector2d low = Eigen::Vector2d::Constant(std::numeric_limits<double>::infinity());
+  Eigen::Vector2d high = -low;
+  for (const Eigen::Vector2d& corner :
+       { Eigen::Vector2d(0.0, 0.0), Eigen::Vector2d(extent.x(), 0.0), extent, Eigen::Vector2d(0.0, extent.y()) })
+  {
+    const Eigen::Vector2d turned = turn * (first + corner);
+    low = low.cwiseMin(turned);
+    high = high.cwiseMax(turned);
+  }
+  const cv::Size turned_size(static_cast<int>(std::ceil(high.x() - low.x())) + 1,
+                             static_cast<int>(std::ceil(high.y() - low.y())) + 1);
+  const cv::Size size(static_cast<int>(std::lround(turned_size.width / TILT)), turned_size.height);
+  if (size.width < MIN_WIDTH)
+  {
+    return;
+  }
+  const cv::Matx23d to_turned(turn(0, 0), turn(0, 1), -low.x(), turn(1, 0), turn(1, 1), -low.y());
+  cv::Mat turned;
+  cv::warpAffine(grey_, turned, to_turned, turned_size, cv::INTER_LINEAR, cv::BORDER_REPLICATE);
+  cv::resize(turned, wanted.image, size, 0.0, 0.0, cv::INTER_AREA);
+  cv::Mat shown = cv::Mat::zeros(grey_.size(), CV_8UC1);
+  shown(region_).setTo(255);
+  cv::Mat turned_mask;
+  cv::warpAffine(shown, turned_mask, to_turned, turned_size, cv::INTER_NEAREST, cv::BORDER_CONSTANT, cv::Scalar(0));
+  cv::resize(turned_mask, wanted.mask, size, 0.0, 0.0, cv::INTER_NEAREST);
+  cv::erode(wanted.mask, wanted.mask, cv::Mat(), cv::Point(-1, -1), EDGE, cv::BORDER_CONSTANT, cv::Scalar(0));
+
+  const double sx = static_cast<double>(turned_size.width) / size.width;
+  Eigen::Matrix3d stretch = Eigen::Matrix3d::Identity();
+  stretch(0, 0) = sx;
+  stretch(0, 2) = 0.5 * (sx - 1.0);
+  Eigen::Matrix3d back = Eigen::Matrix3d::Identity();
+  back.topLeftCorner<2, 2>() = turn.transpose();
+  back.topRightCorner<2, 1>() = turn.transpose() * low;
+  wanted.to_full = back * stretch;
+}
+
 Eigen::Matrix3d PreparedImage::toFull(int number) const
 {
-  const cv::Mat& reduced = image(number);
-  const double sx = reduced.empty() ? 1.0 : static_cast<double>(grey_.cols) / reduced.cols;
-  const double sy = reduced.empty() ? 1.0 : static_cast<double>(grey_.rows) / reduced.rows;
-  Eigen::Matrix3d map = Eigen::Matrix3d::Identity();
-  map(0, 0) = sx;
-  map(1, 1) = sy;
-  map(0, 2) = 0.5 * (sx - 1.0);  // the image's edge is half a pixel before the centre of its first pixel
-  map(1, 2) = 0.5 * (sy - 1.0);
-  return map;
+  image(number);
+  return level(number).to_full;
 }
 
 const PointFeatures& PreparedImage::points(int number) const
@@ -84,8 +144,8 @@ const PointFeatures& PreparedImage::points(int number) const
     {
       return;
     }
-    cv::Mat mask;
-    if (region_.size() != grey_.size())
+    cv::Mat mask = wanted.mask;
+    if (mask.empty() && region_.size() != grey_.size())
     {
       cv::Mat full = cv::Mat::zeros(grey_.size(), CV_8UC1);
       full(region_).setTo(255);

@@ -12,6 +12,7 @@
 #include <Eigen/Geometry>
 #include <Eigen/LU>
 #include <opencv2/core.hpp>
+#include <opencv2/core/eigen.hpp>
 #include <opencv2/imgproc.hpp>
 
 #include <cmath>
@@ -53,6 +54,19 @@ ViewMatch matchImages(const PointViewMatcherParams& params, const cv::Mat& refer
 {
   return PointViewMatcher(params).match(PreparedImage(reference, region, params.points),
                                         PreparedImage(current, cv::Rect(), params.points), model);
+}
+
+/** The picture seen through `h`, which maps to pixels `over` times as small as those of the result. */
+cv::Mat averaged(const cv::Mat& picture, const Eigen::Matrix3d& h, const cv::Size& size, double over)
+{
+  cv::Mat map;
+  cv::eigen2cv(h, map);
+  cv::Mat large;
+  cv::warpPerspective(picture, large, map, cv::Size(cvRound(size.width * over), cvRound(size.height * over)),
+                      cv::INTER_LINEAR, cv::BORDER_CONSTANT, cv::Scalar(128));
+  cv::Mat result;
+  cv::resize(large, result, size, 0.0, 0.0, cv::INTER_AREA);
+  return result;
 }
 
 /** Two planes meeting in the middle of the reference like the pages of an open book, seen by two cameras. */
@@ -253,6 +267,34 @@ TEST(PointViewMatcher, FindsAViewThatIsMuchSmallerOrLarger)
 
   params.scale_search = false;
   EXPECT_EQ(matchImages(params, reference, current).outcome, MatchOutcome::NO_GEOMETRY);
+}
+
+TEST(PointViewMatcher, FindsAPlaneThatIsSeenVeryObliquely)
+{
+  // Like bench_points' planes: the picture fills the reference and turns about an axis through its centre.
+  constexpr double TILT = 85.0;  // [degrees]
+  const cv::Size size(768, 576);
+  Eigen::Matrix3d k;
+  k << 800.0, 0.0, 383.5, 0.0, 800.0, 287.5, 0.0, 0.0, 1.0;
+  const Eigen::Vector3d axis(std::sin(0.2), std::cos(0.2), 0.0);
+  const Eigen::Matrix3d turn = Eigen::AngleAxisd(TILT * M_PI / 180.0, axis).toRotationMatrix();
+  const Eigen::Vector3d centre = Eigen::Vector3d::UnitZ();
+  const Eigen::Matrix3d h = k * (turn + (centre - turn * centre) * centre.transpose()) * k.inverse();
+
+  // Drawn larger and averaged, as what is compressed so much would show false patterns else.
+  constexpr double OVER = 4.0;
+  Eigen::Matrix3d enlarge = Eigen::Vector3d(OVER, OVER, 1.0).asDiagonal();
+  enlarge(0, 2) = enlarge(1, 2) = 0.5 * (OVER - 1.0);
+  const cv::Mat reference = texturedPicture(31, size);
+  const cv::Mat current = disturbed(averaged(reference, enlarge * h, size, OVER), 0.8, 10.0, 2.0);
+
+  PointViewMatcherParams params;
+  const ViewMatch found = matchImages(params, reference, current);
+  ASSERT_EQ(found.outcome, MatchOutcome::MATCHED) << found.message;
+  EXPECT_GE(found.reference_level, PreparedImage::SCALES);
+  EXPECT_LT(cornerError(found.matrix, h, size), 5.0);
+  params.side_search = false;
+  EXPECT_NE(matchImages(params, reference, current).outcome, MatchOutcome::MATCHED);
 }
 
 TEST(PointViewMatcher, FindsNothingInUnrelatedPictures)

@@ -33,7 +33,7 @@ TEST(PreparedImage, LevelsShrinkByTheRootOfTwoAndMapBack)
   EXPECT_EQ(image.image(2).size(), cv::Size(240, 180));
   EXPECT_EQ(image.toFull(0), Eigen::Matrix3d::Identity());
   // The outer edges of the first and the last pixel stay where they are.
-  for (int level = 0; level < PreparedImage::LEVELS; ++level)
+  for (int level = 0; level < PreparedImage::SCALES; ++level)
   {
     const cv::Size size = image.image(level).size();
     const Eigen::Vector3d first = image.toFull(level) * Eigen::Vector3d(-0.5, -0.5, 1.0);
@@ -41,6 +41,54 @@ TEST(PreparedImage, LevelsShrinkByTheRootOfTwoAndMapBack)
     EXPECT_NEAR((first.hnormalized() - Eigen::Vector2d(-0.5, -0.5)).norm(), 0.0, 1e-9);
     EXPECT_NEAR((last.hnormalized() - Eigen::Vector2d(479.5, 359.5)).norm(), 0.0, 1e-9);
   }
+}
+
+TEST(PreparedImage, ShowsTheSamePlacesFromTheSides)
+{
+  const PreparedImage image(texturedPicture(1), cv::Rect(), PointMatcherParams());
+  for (int side = 0; side < PreparedImage::SIDES; ++side)
+  {
+    SCOPED_TRACE(side);
+    const int level = PreparedImage::SCALES + side;
+    const Eigen::Matrix3d to_full = image.toFull(level);
+    EXPECT_EQ(to_full.row(2), Eigen::RowVector3d(0.0, 0.0, 1.0));
+    EXPECT_NEAR(to_full.topLeftCorner(2, 2).determinant(), PreparedImage::TILT, 0.1);
+
+    // Blurred along the direction in which it is compressed, the full image has nearly the same grey values.
+    const Eigen::Vector2d along = to_full.topLeftCorner(2, 2).col(0);
+    double difference = 0.0;
+    int count = 0;
+    for (const Corner& corner : image.points(level).corners)
+    {
+      const Eigen::Vector2d centre = (to_full * corner.position.homogeneous()).hnormalized();
+      EXPECT_GT(centre.x(), 0.0);
+      EXPECT_GT(centre.y(), 0.0);
+      EXPECT_LT(centre.x(), 479.0);
+      EXPECT_LT(centre.y(), 359.0);
+      const cv::Point at(static_cast<int>(std::lround(corner.position.x())),
+                         static_cast<int>(std::lround(corner.position.y())));
+      const Eigen::Vector2d exact = (to_full * Eigen::Vector3d(at.x, at.y, 1.0)).hnormalized();
+      double sum = 0.0;
+      constexpr int SAMPLES = 11;
+      for (int i = 0; i < SAMPLES; ++i)
+      {
+        const Eigen::Vector2d place = exact + ((i + 0.5) / SAMPLES - 0.5) * along;
+        const cv::Point pixel(static_cast<int>(std::lround(place.x())), static_cast<int>(std::lround(place.y())));
+        sum += image.grey().at<unsigned char>(std::clamp(pixel.y, 0, 359), std::clamp(pixel.x, 0, 479));
+      }
+      difference += std::abs(sum / SAMPLES - image.image(level).at<unsigned char>(at));
+      ++count;
+    }
+    ASSERT_GT(count, 50);
+    EXPECT_LT(difference / count, 8.0);
+  }
+}
+
+TEST(PreparedImage, LeavesOutSidesOfSmallImages)
+{
+  const PreparedImage image(texturedPicture(1), cv::Rect(10, 10, 100, 80), PointMatcherParams());
+  EXPECT_TRUE(image.image(PreparedImage::SCALES).empty());
+  EXPECT_TRUE(image.points(PreparedImage::SCALES).corners.empty());
 }
 
 TEST(PreparedImage, ComputesItsFeaturesOnceForAllThreads)
@@ -69,9 +117,9 @@ TEST(PreparedImage, LooksForFeaturesInItsRegionOnEveryLevel)
   const cv::Rect region(100, 60, 220, 200);
   const PreparedImage image(texturedPicture(3), region, PointMatcherParams());
   EXPECT_EQ(image.region(), region);
-  for (int level = 0; level < 3; ++level)
+  for (const int level : { 0, 1, 2, PreparedImage::SCALES, PreparedImage::SCALES + 3 })
   {
-    ASSERT_GT(image.points(level).corners.size(), 20U);
+    ASSERT_GT(image.points(level).corners.size(), level < PreparedImage::SCALES ? 20U : 5U);
     for (const Corner& corner : image.points(level).corners)
     {
       const Eigen::Vector2d full = (image.toFull(level) * corner.position.homogeneous()).hnormalized();

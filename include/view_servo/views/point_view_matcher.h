@@ -50,6 +50,7 @@ struct PointViewMatcherParams
    */
   double first_share = 0.6;
   bool scale_search = true;  ///< try other scale ratios and coarser scales when the full images give no geometry
+  bool side_search = true;   ///< then try the reference as it would look from the sides
   double min_log_significance = 6.0;  ///< least ViewMatch::log_significance of a geometry that is accepted
   bool unique = true;                 ///< refuse a geometry when another one, a shift off, fits nearly as well
   double min_log_parallax = 3.0;      ///< least Parallax::significance() of a fundamental matrix, off its best plane

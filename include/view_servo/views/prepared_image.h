@@ -41,13 +41,17 @@ struct FeatureParams
  * An image with the features for matching, each computed once, when it is first asked for: a stored view that is kept
  * need not be analysed again for the next live image. Safe to use from several threads.
  *
- * Level l is the image reduced by 2^(l/2) on each side. Its features are in its own pixels; toFull() maps them.
- * Asking for a level outside [0, LEVELS) throws std::out_of_range.
+ * Level l < SCALES is the image reduced by 2^(l/2) on each side. The others are the image as it would look from the
+ * sides (Morel & Yu 2009): compressed by TILT in one of SIDES directions. Features of a level are in its own pixels;
+ * toFull() maps them. Asking for a level outside [0, LEVELS) throws std::out_of_range.
  */
 class PreparedImage
 {
 public:
-  static constexpr int LEVELS = 5;
+  static constexpr int SCALES = 5;
+  static constexpr int SIDES = 8;
+  static constexpr int LEVELS = SCALES + SIDES;
+  static constexpr double TILT = 5.5;
 
   /**
    * @param grey 8-bit, one channel; the data is shared and must not be changed afterwards.
@@ -65,7 +69,7 @@ public:
     return region_;
   }
 
-  /** The image of level `number`; small ones (a side under 64 px) are empty, and so are their features. */
+  /** The image of level `number`; ones that would be too small are empty, and so are their features. */
   const cv::Mat& image(int number) const;
   const PointFeatures& points(int number) const;
   const ProfileIndex& profileIndex(int number) const;
@@ -73,7 +77,7 @@ public:
   /** The line segments of the full image, in its region. @throws what detectLineSegments() and LineFeatures throw. */
   const LineFeatures& lines() const;
 
-  /** Maps pixels of a level to pixels of the full image (homogeneous; a scale and a shift). */
+  /** Maps pixels of a level to pixels of the full image (homogeneous, affine). */
   Eigen::Matrix3d toFull(int number) const;
 
 private:
@@ -83,11 +87,15 @@ private:
     std::once_flag points_once;
     std::once_flag index_once;
     cv::Mat image;
+    cv::Mat mask;             ///< of a side: where the image shows the region, without its edge
+    Eigen::Matrix3d to_full;  ///< see toFull()
     PointFeatures points;
     std::unique_ptr<ProfileIndex> index;
   };
 
   Level& level(int number) const;
+  void reduce(Level& wanted, int number) const;
+  void lookFromSide(Level& wanted, int side) const;
 
   cv::Mat grey_;
   cv::Rect region_;
