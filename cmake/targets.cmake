@@ -29,6 +29,15 @@ function(precompile target group)
   endif()
 endfunction()
 
+# precompile_ros(TARGET): for static libraries and programs that include much of ROS.
+function(precompile_ros target)
+  # Of headers that are precompiled GCC warns although they are not ours: it takes parts of boost for uninitialized.
+  target_compile_options(${target} PRIVATE $<$<CXX_COMPILER_ID:GNU>:-Wno-maybe-uninitialized> -Wno-uninitialized)
+  precompile(${target} NODES <actionlib/server/action_server.h> <diagnostic_updater/diagnostic_updater.h>
+    <image_transport/image_transport.h> <message_filters/time_synchronizer.h> <ros/ros.h> <sensor_msgs/CameraInfo.h>
+    <sensor_msgs/Image.h> <tf2_ros/transform_listener.h> <opencv2/core.hpp> <Eigen/Geometry>)
+endfunction()
+
 # link_visp(TARGET MODULE...). In a function, as ViSP's package sets compiler flags for all that follows in the same scope.
 # Debian 11's names files of an OpenCV that is not there; its libraries themselves know what they need.
 function(link_visp target)
@@ -60,11 +69,7 @@ function(vs_executable name)
   target_include_directories(${target} PRIVATE ${PROJECT_SOURCE_DIR}/src)
   target_link_libraries(${target} PRIVATE ${ARG_LIBS})
   if(ARG_NODE)
-    # Of headers that are precompiled GCC warns although they are not ours: it takes parts of boost for uninitialized.
-    target_compile_options(${target} PRIVATE $<$<CXX_COMPILER_ID:GNU>:-Wno-maybe-uninitialized> -Wno-uninitialized)
-    precompile(${target} NODES <actionlib/server/action_server.h> <diagnostic_updater/diagnostic_updater.h>
-      <image_transport/image_transport.h> <message_filters/time_synchronizer.h> <ros/ros.h> <sensor_msgs/CameraInfo.h>
-      <sensor_msgs/Image.h> <tf2_ros/transform_listener.h> <opencv2/core.hpp> <Eigen/Geometry>)
+    precompile_ros(${target})
   endif()
   install(TARGETS ${target} RUNTIME DESTINATION ${CATKIN_PACKAGE_BIN_DESTINATION})
 endfunction()

@@ -3,6 +3,7 @@
 #pragma once
 
 #include "view_servo/geometry/correspondence.h"
+#include "view_servo/geometry/rotation_vector.h"
 #include "view_servo/robust/ransac.h"
 
 #include <Eigen/Core>
@@ -82,8 +83,9 @@ inline Scene makeScene(const SceneOptions& options, Rng& rng)
   const double baseline = uniform(rng, 0.7, 1.5);
   const Eigen::Vector3d centre(baseline * std::cos(bearing), baseline * std::sin(bearing), uniform(rng, -0.5, 0.5));
   const Eigen::Vector3d target(0.0, 0.0, 4.5);
-  scene.r = randomRotation(rng, 0.05) *
-            Eigen::Quaterniond::FromTwoVectors((target - centre).normalized(), Eigen::Vector3d::UnitZ());
+  const Eigen::Vector3d forward = (target - centre).normalized();
+  const Eigen::Vector3d axis = forward.cross(Eigen::Vector3d::UnitZ()).normalized();
+  scene.r = randomRotation(rng, 0.05) * rotationFromVector(std::acos(forward.z()) * axis);
   scene.t = -scene.r * centre;
   scene.n = randomRotation(rng, 0.25) * Eigen::Vector3d::UnitZ();
   scene.d = scene.n.dot(target);
