@@ -2,6 +2,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "view_servo/control/servo_25d.h"
 
+#include "view_servo/geometry/rotation_vector.h"
 #include "view_servo/parameters/faults.h"
 
 #include <visp3/core/vpColVector.h>
@@ -25,12 +26,6 @@ namespace view_servo
 namespace
 {
 constexpr double DEGREES = 180.0 / M_PI;
-
-Eigen::Vector3d thetaU(const Eigen::Matrix3d& rotation)
-{
-  const Eigen::AngleAxisd turn(rotation);
-  return turn.angle() * turn.axis();
-}
 
 /** The displacement of a body that moves by a twist of its own for a time: where its frame is in the former one. */
 Eigen::Isometry3d displacement(const Twist& twist, double duration)
@@ -82,7 +77,7 @@ Servo25dError servo25dError(const EuclideanHomography& motion, const Eigen::Vect
 {
   const Eigen::Vector3d seen = motion.matrix() * point.homogeneous();
   // X_cur = Z* (R + t nᵀ / d) m*: the third number is the ratio of the depths.
-  return { seen.hnormalized() - point, std::log(seen.z()), thetaU(motion.rotation.transpose()) };
+  return { seen.hnormalized() - point, std::log(seen.z()), rotationVector(motion.rotation.transpose()) };
 }
 
 /** ViSP's task: the features stay, their values change. */

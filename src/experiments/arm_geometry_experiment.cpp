@@ -7,6 +7,7 @@
 #include "view_servo/geometry/correspondence.h"
 #include "view_servo/geometry/euclidean_homography.h"
 #include "view_servo/geometry/homography.h"
+#include "view_servo/geometry/rotation_vector.h"
 
 #include <yaml-cpp/yaml.h>
 #include <Eigen/Geometry>
@@ -91,13 +92,9 @@ Eigen::Isometry3d readPose(const fs::path& file)
   {
     throw std::runtime_error("cannot read " + file.string() + ": " + error.what());
   }
-  const Eigen::Vector3d turn = values.tail<3>();
   Eigen::Isometry3d pose = Eigen::Isometry3d::Identity();
   pose.translation() = values.head<3>();
-  if (turn.norm() > 0.0)
-  {
-    pose.linear() = Eigen::AngleAxisd(turn.norm(), turn.normalized()).toRotationMatrix();
-  }
+  pose.linear() = rotationFromVector(values.tail<3>());
   return pose;
 }
 
@@ -286,10 +283,9 @@ using ServoError = Eigen::Matrix<double, 6, 1>;
  */
 ServoError servoError(const Eigen::Vector3d& current, const Eigen::Vector3d& reference, const Eigen::Matrix3d& rotation)
 {
-  const Eigen::AngleAxisd turn(rotation);
   ServoError error;
   error << current.hnormalized() - reference.hnormalized(), std::log(current.z() / reference.z()),
-      turn.angle() * turn.axis();
+      rotationVector(rotation);
   return error;
 }
 

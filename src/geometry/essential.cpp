@@ -5,6 +5,7 @@
 #include "levenberg_marquardt.h"
 #include "residuals.h"
 #include "view_servo/geometry/fundamental.h"
+#include "view_servo/geometry/rotation_vector.h"
 
 #include <Eigen/LU>
 #include <opencv2/calib3d.hpp>
@@ -67,7 +68,7 @@ struct RelativePoseProblem
   static RelativePose moved(const RelativePose& pose, const Eigen::Matrix<double, 5, 1>& step)
   {
     const Eigen::Matrix3d tangents = tangentsOf(pose.translation);
-    return { rotated(pose.rotation, step.head<3>()),
+    return { pose.rotation * rotationFromVector(step.head<3>()),
              (pose.translation + step(3) * tangents.col(0) + step(4) * tangents.col(1)).normalized() };
   }
 

@@ -4,6 +4,7 @@
 
 #include "view_servo/geometry/correspondence.h"
 #include "view_servo/geometry/essential.h"
+#include "view_servo/geometry/rotation_vector.h"
 
 #include "decompositions.h"
 #include "normalization.h"
@@ -90,13 +91,6 @@ inline double sampsonResidual(const Eigen::Matrix3d& f, const Correspondence& pa
   return algebraic / gradient;
 }
 
-/** Rotation times that by a rotation vector [rad]. */
-inline Eigen::Matrix3d rotated(const Eigen::Matrix3d& rotation, const Eigen::Vector3d& angles)
-{
-  const double angle = angles.norm();
-  return angle > 0.0 ? rotation * Eigen::AngleAxisd(angle, angles / angle).toRotationMatrix() : rotation;
-}
-
 /** F = U diag(cos p, sin p, 0) V^T, U and V rotations (orthonormal representation, Bartoli & Sturm 2004). */
 struct Orthonormal
 {
@@ -124,8 +118,8 @@ struct Orthonormal
   Orthonormal moved(const Vector7d& step) const
   {
     Orthonormal next = *this;
-    next.u = rotated(u, step.head<3>());
-    next.v = rotated(v, step.segment<3>(3));
+    next.u = u * rotationFromVector(step.head<3>());
+    next.v = v * rotationFromVector(step.segment<3>(3));
     next.p += step(6);
     return next;
   }

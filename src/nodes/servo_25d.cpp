@@ -6,6 +6,7 @@
 #include "view_servo/ServoToViewAction.h"
 #include "view_servo/control/joint_guard.h"
 #include "view_servo/geometry/camera_warp.h"
+#include "view_servo/geometry/region.h"
 #include "view_servo/ros/arm_conversions.h"
 #include "view_servo/ros/conversions.h"
 #include "view_servo/ros/driver_node.h"
@@ -137,8 +138,7 @@ public:
     const CameraWarp warp(cameraOf(stored, camera), camera.rectified());
     const cv::Size size = warp.size();
     const cv::Rect region = stored.region.empty() ? cv::Rect(cv::Point(), stored.image.size()) : stored.region;
-    const Eigen::Vector2d middle =
-        warp.point({ region.x + 0.5 * (region.width - 1), region.y + 0.5 * (region.height - 1) });
+    const Eigen::Vector2d middle = warp.point(middleOf(region));
     if (!middle.allFinite())
     {
       throw std::runtime_error("this camera cannot show the middle of the region of view '" + stored.name + "'");

@@ -3,6 +3,7 @@
 #include "view_servo/ros/plane_session.h"
 
 #include "view_servo/geometry/homography.h"
+#include "view_servo/geometry/region.h"
 #include "view_servo/ros/conversions.h"
 
 #include <Eigen/LU>
@@ -94,8 +95,7 @@ const PlaneTrack& PlaneSession::add(const cv::Mat& raw, const std::optional<Eige
   if (track.state == TrackingState::TRACKING)
   {
     last_h_ = track.homography.h;
-    const Eigen::Vector2d middle(region_.x + 0.5 * (region_.width - 1), region_.y + 0.5 * (region_.height - 1));
-    path_.push_back(transfer(*last_h_, middle));
+    path_.push_back(transfer(*last_h_, middleOf(region_)));
     if (path_.size() > LONGEST_PATH)
     {
       path_.erase(path_.begin());

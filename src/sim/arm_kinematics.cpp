@@ -2,6 +2,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "sim/arm_kinematics.h"
 
+#include "view_servo/geometry/rotation_vector.h"
 #include "view_servo/parameters/faults.h"
 #include "view_servo/parameters/parameter.h"
 #include "view_servo/robust/random.h"
@@ -260,9 +261,8 @@ ArmKinematics::Joints ArmKinematics::improve(Joints joints, const Eigen::Isometr
   for (int i = 0; i < STEPS; ++i)
   {
     const Eigen::Isometry3d left = pose(joints).inverse() * goal;
-    const Eigen::AngleAxisd turn(left.linear());
     Twist twist;  // for 1 s
-    twist << left.translation(), turn.angle() * turn.axis();
+    twist << left.translation(), rotationVector(left.linear());
     joints += follow(joints, twist).velocities;
   }
   return joints;

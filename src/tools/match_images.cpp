@@ -5,6 +5,7 @@
 #include "view_servo/geometry/camera.h"
 #include "view_servo/geometry/correspondence.h"
 #include "view_servo/geometry/fundamental.h"
+#include "view_servo/geometry/region.h"
 #include "view_servo/images/image_io.h"
 #include "view_servo/matching/line_features.h"
 #include "view_servo/parameters/parameter.h"
@@ -138,10 +139,8 @@ Eigen::Matrix3d readHomography(const std::string& path)
 /** Mean distance between the places to which two homographies take the corners of an image [px]. */
 double meanCornerError(const Eigen::Matrix3d& h, const Eigen::Matrix3d& truth, const cv::Size& size)
 {
-  const double right = size.width - 1.0;
-  const double bottom = size.height - 1.0;
   double sum = 0.0;
-  for (const Eigen::Vector2d& corner : Points{ { 0.0, 0.0 }, { right, 0.0 }, { right, bottom }, { 0.0, bottom } })
+  for (const Eigen::Vector2d& corner : cornersOf(size))
   {
     const Eigen::Vector3d x = corner.homogeneous();
     sum += ((h * x).hnormalized() - (truth * x).hnormalized()).norm();

@@ -8,6 +8,7 @@
 #include "sim_ros/robot_messages.h"
 #include "tools/command_line.h"
 #include "tools/package_folder.h"
+#include "view_servo/geometry/rotation_vector.h"
 #include "view_servo/images/image_io.h"
 #include "view_servo/ros/conversions.h"
 
@@ -135,19 +136,12 @@ void writeSensors(BagWriter& bag, sim::Robot& robot, const ros::Time& stamp)
   }
 }
 
-/** Rotation vector. */
-Eigen::Vector3d logOf(const Eigen::Matrix3d& rotation)
-{
-  const Eigen::AngleAxisd turn(rotation);
-  return turn.angle() * turn.axis();
-}
-
 /** The twist of `from` that would take it to `to` in a second. */
 Twist twistBetween(const Eigen::Isometry3d& from, const Eigen::Isometry3d& to)
 {
   Twist twist;
   twist << from.linear().transpose() * (to.translation() - from.translation()),
-      logOf(from.linear().transpose() * to.linear());
+      rotationVector(from.linear().transpose() * to.linear());
   return twist;
 }
 
@@ -175,13 +169,9 @@ std::vector<Eigen::Isometry3d> posesOfExposure(const Eigen::Isometry3d& before, 
   for (int i = 0; i < BLUR_POSES; ++i)
   {
     const double time = exposure * (static_cast<double>(i) / (BLUR_POSES - 1) - 0.5);
-    const Eigen::Vector3d turn = time * motion.tail<3>();
     Eigen::Isometry3d pose = now;
     pose.translation() += before.linear() * (time * motion.head<3>());
-    if (turn.norm() > 0.0)
-    {
-      pose.linear() = now.linear() * Eigen::AngleAxisd(turn.norm(), turn.normalized()).toRotationMatrix();
-    }
+    pose.linear() = now.linear() * rotationFromVector(time * motion.tail<3>());
     poses.push_back(pose);
   }
   return poses;

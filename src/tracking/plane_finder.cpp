@@ -3,6 +3,7 @@
 #include "view_servo/tracking/plane_finder.h"
 
 #include "view_servo/geometry/homography.h"
+#include "view_servo/geometry/region.h"
 
 #include <opencv2/core.hpp>
 #include <opencv2/imgproc.hpp>
@@ -20,16 +21,18 @@ constexpr double RIVALRY = 0.5;  // a second place counts from this part of the 
 /** The corners of a rectangle of pixels, moved by a homography; NaN beyond the horizon. */
 std::array<Eigen::Vector2d, 4> movedCorners(const cv::Rect& rect, const Eigen::Matrix3d& h)
 {
-  const double right = rect.x + rect.width - 1.0;
-  const double bottom = rect.y + rect.height - 1.0;
-  return { transfer(h, Eigen::Vector2d(rect.x, rect.y)), transfer(h, Eigen::Vector2d(right, rect.y)),
-           transfer(h, Eigen::Vector2d(right, bottom)), transfer(h, Eigen::Vector2d(rect.x, bottom)) };
+  std::array<Eigen::Vector2d, 4> corners = cornersOf(rect);
+  for (Eigen::Vector2d& corner : corners)
+  {
+    corner = transfer(h, corner);
+  }
+  return corners;
 }
 
 /** Whether two homographies show a region in different places: its middles are apart by half its size. */
 bool isElsewhere(const cv::Rect& region, const Eigen::Matrix3d& h, const Eigen::Matrix3d& other)
 {
-  const Eigen::Vector2d middle(region.x + 0.5 * (region.width - 1), region.y + 0.5 * (region.height - 1));
+  const Eigen::Vector2d middle = middleOf(region);
   const std::array<Eigen::Vector2d, 4> corners = movedCorners(region, h);
   const double size = 0.5 * ((corners[2] - corners[0]).norm() + (corners[3] - corners[1]).norm());
   return !((transfer(h, middle) - transfer(other, middle)).norm() < 0.25 * size);

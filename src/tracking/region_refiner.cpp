@@ -4,6 +4,7 @@
 
 #include "patch.h"
 #include "view_servo/geometry/homography.h"
+#include "view_servo/geometry/region.h"
 #include "view_servo/robust/median.h"
 
 #include <Eigen/LU>
@@ -32,7 +33,7 @@ cv::Mat smoothed(const cv::Mat& image)
 RegionRefiner::RegionRefiner(const cv::Mat& reference, const cv::Rect& region, double min_correlation)
   : min_correlation_(static_cast<float>(min_correlation))
 {
-  centring_.middle = { region.x + 0.5 * (region.width - 1), region.y + 0.5 * (region.height - 1) };
+  centring_.middle = middleOf(region);
   centring_.spread = 0.25 * (region.width + region.height);
   const cv::Mat image = smoothed(reference);
   const cv::Rect inner = region & cv::Rect(1, 1, image.cols - 3, image.rows - 3);  // where there are gradients

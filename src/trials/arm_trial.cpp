@@ -4,6 +4,7 @@
 
 #include "sim/renderer.h"
 #include "trials/trial.h"
+#include "view_servo/geometry/region.h"
 #include "view_servo/tracking/plane_finder.h"
 #include "view_servo/views/prepared_image.h"
 
@@ -46,10 +47,7 @@ Puma makePuma(const std::string& urdf_xml, const ArmTrialParams& params)
 
 ServoTarget targetOf(const World& world, const Eigen::Matrix3d& k)
 {
-  const cv::Rect& region = world.region;
-  return { k,
-           { world.camera.width, world.camera.height },
-           { region.x + 0.5 * (region.width - 1), region.y + 0.5 * (region.height - 1) } };
+  return { k, { world.camera.width, world.camera.height }, middleOf(world.region) };
 }
 
 }  // namespace

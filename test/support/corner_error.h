@@ -3,6 +3,7 @@
 #pragma once
 
 #include "view_servo/geometry/homography.h"
+#include "view_servo/geometry/region.h"
 
 #include <Eigen/Core>
 #include <opencv2/core/types.hpp>
@@ -18,12 +19,9 @@ inline std::array<double, 4> cornerErrors(const Eigen::Matrix3d& estimated, cons
 {
   std::array<double, 4> errors{};
   std::size_t i = 0;
-  for (const double u : { 0.0, size.width - 1.0 })
+  for (const Eigen::Vector2d& corner : cornersOf(size))
   {
-    for (const double v : { 0.0, size.height - 1.0 })
-    {
-      errors[i++] = (transfer(estimated, { u, v }) - transfer(truth, { u, v })).norm();
-    }
+    errors[i++] = (transfer(estimated, corner) - transfer(truth, corner)).norm();
   }
   return errors;
 }
