@@ -79,14 +79,10 @@ public:
     copyRowMajor(result.fundamental, response.fundamental);
   }
 
-  static Message toMessage(const Result& result, const MatchLabel& label)
+  static Message toMessage(const Result& result, const MatchLabel& /*label*/)
   {
     Message message;
-    message.header = label.header;
-    message.view = label.chosen.view;
-    message.goal = label.chosen.goal;
     message.reason = result.lines.empty() ? result.message : "";
-    message.refused = label.refused;
     message.matches = toLineMatches(result.lines);
     message.points = toPointMatches(result.matches);
     return message;

@@ -93,11 +93,7 @@ public:
   static Message toMessage(const Result& result, const MatchLabel& label)
   {
     Message message;
-    message.header = label.header;
-    message.view = label.chosen.view;
-    message.goal = label.chosen.goal;
     message.reason = result.outcome == MatchOutcome::MATCHED ? "" : result.message;
-    message.refused = label.refused;
     message.matches = toPointMatches(result.matches);
     message.homography = toHomography(result, label.chosen.view, label.header);
     message.homography.goal = label.chosen.goal;

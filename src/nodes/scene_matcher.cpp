@@ -119,11 +119,7 @@ void fillFields(const SceneResult& result, Fields& fields)
   }
   if (result.motion)
   {
-    const Eigen::Quaterniond rotation(result.motion->pose.rotation);
-    fields.rotation.x = rotation.x();
-    fields.rotation.y = rotation.y();
-    fields.rotation.z = rotation.z();
-    fields.rotation.w = rotation.w();
+    fields.rotation = toMessage(Eigen::Quaterniond(result.motion->pose.rotation));
     fields.direction = toMessage(result.motion->pose.translation);
     Eigen::Map<Eigen::Matrix<double, 6, 6>>(fields.covariance.data()) = result.motion->covariance;  // symmetric
   }
@@ -188,14 +184,10 @@ public:
     }
   }
 
-  static Message toMessage(const Result& result, const MatchLabel& label)
+  static Message toMessage(const Result& result, const MatchLabel& /*label*/)
   {
     Message message;
-    message.header = label.header;
-    message.view = label.chosen.view;
-    message.goal = label.chosen.goal;
     message.reason = result.outcome == MatchOutcome::MATCHED ? "" : result.message;
-    message.refused = label.refused;
     clearFields(message);
     fillFields(result, message);
     return message;

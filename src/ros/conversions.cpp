@@ -180,10 +180,7 @@ geometry_msgs::PoseStamped toPoseStamped(const ViewPose& pose, const ros::Time& 
   message.pose.position.x = pose.position.x();
   message.pose.position.y = pose.position.y();
   message.pose.position.z = pose.position.z();
-  message.pose.orientation.x = pose.orientation.x();
-  message.pose.orientation.y = pose.orientation.y();
-  message.pose.orientation.z = pose.orientation.z();
-  message.pose.orientation.w = pose.orientation.w();
+  message.pose.orientation = toMessage(pose.orientation);
   return message;
 }
 
@@ -276,11 +273,7 @@ Homography toHomography(const PlaneTrack& track, const std::string& view, const 
   if (track.plane)
   {
     const EuclideanHomography& motion = track.plane->motion;
-    const Eigen::Quaterniond rotation(motion.rotation);
-    message.rotation.x = rotation.x();
-    message.rotation.y = rotation.y();
-    message.rotation.z = rotation.z();
-    message.rotation.w = rotation.w();
+    message.rotation = toMessage(Eigen::Quaterniond(motion.rotation));
     message.translation_over_distance = toMessage(motion.translation_over_distance);
     if (track.plane->normal_known)
     {
@@ -305,6 +298,16 @@ Eigen::Isometry3d toIsometry(const geometry_msgs::Transform& transform)
 Eigen::Vector3d toVector(const geometry_msgs::Vector3& vector)
 {
   return { vector.x, vector.y, vector.z };
+}
+
+geometry_msgs::Quaternion toMessage(const Eigen::Quaterniond& rotation)
+{
+  geometry_msgs::Quaternion message;
+  message.x = rotation.x();
+  message.y = rotation.y();
+  message.z = rotation.z();
+  message.w = rotation.w();
+  return message;
 }
 
 geometry_msgs::Vector3 toMessage(const Eigen::Vector3d& vector)

@@ -13,80 +13,80 @@ HomingWorker::HomingWorker(std::string image_topic, std::function<void(const Hom
   : image_topic_(std::move(image_topic)),
     on_outcome_(std::move(on_outcome)),
     on_idle_frame_(std::move(on_idle_frame)),
-    worker_("work on images and matches", [this](Inbox&& inbox) { work(inbox); })
+    worker_("work on images and matches", [this](Inputs&& inputs) { work(inputs); })
 {
 }
 
 void HomingWorker::setTask(const std::shared_ptr<HomingTask>& task)
 {
-  worker_.put([&](Inbox& inbox) {
-    inbox = Inbox();
-    inbox.task = task;
+  worker_.put([&](Inputs& inputs) {
+    inputs = Inputs();
+    inputs.task = task;
   });
 }
 
 void HomingWorker::addOdometry(double stamp, const PlanarPose& base_in_odom)
 {
-  worker_.put([&](Inbox& inbox) { inbox.odometry.emplace_back(stamp, base_in_odom); });
+  worker_.put([&](Inputs& inputs) { inputs.odometry.emplace_back(stamp, base_in_odom); });
 }
 
 void HomingWorker::addMatches(double stamp, const HeadingEvidence& evidence)
 {
   // One of points and one of lines: where work takes longer than the time between two, a queue would grow without end.
   constexpr std::size_t MOST = 2;
-  worker_.put([&](Inbox& inbox) {
-    if (inbox.matches.size() >= MOST)
+  worker_.put([&](Inputs& inputs) {
+    if (inputs.matches.size() >= MOST)
     {
-      inbox.matches.erase(inbox.matches.begin());
+      inputs.matches.erase(inputs.matches.begin());
     }
-    inbox.matches.emplace_back(stamp, evidence);
+    inputs.matches.emplace_back(stamp, evidence);
   });
 }
 
 void HomingWorker::addFrame(const CameraFrame& frame)
 {
-  worker_.put([&](Inbox& inbox) {
-    inbox.frame = frame;
-    inbox.frame_time = std::chrono::steady_clock::now();
+  worker_.put([&](Inputs& inputs) {
+    inputs.frame = frame;
+    inputs.frame_time = std::chrono::steady_clock::now();
   });
 }
 
-void HomingWorker::work(const Inbox& inbox)
+void HomingWorker::work(const Inputs& inputs)
 {
-  task_ = inbox.task.value_or(task_);
+  task_ = inputs.task.value_or(task_);
   if (!task_)
   {
-    if (inbox.frame)
+    if (inputs.frame)
     {
-      on_idle_frame_(*inbox.frame);
+      on_idle_frame_(*inputs.frame);
     }
     return;
   }
   HomingOutcome outcome;
   outcome.task = task_;
-  outcome.fault = guarded("work on an image", [&] { add(inbox, *task_->homing); });
+  outcome.fault = guarded("work on an image", [&] { add(inputs, *task_->homing); });
   outcome.report = task_->homing->report();
   outcome.course = task_->homing->course();
-  if (inbox.frame)
+  if (inputs.frame)
   {
-    outcome.frame_time = inbox.frame_time;
+    outcome.frame_time = inputs.frame_time;
   }
   on_outcome_(outcome);
 }
 
-void HomingWorker::add(const Inbox& inbox, Homing& homing) const
+void HomingWorker::add(const Inputs& inputs, Homing& homing) const
 {
-  for (const auto& [stamp, pose] : inbox.odometry)
+  for (const auto& [stamp, pose] : inputs.odometry)
   {
     homing.addOdometry(stamp, pose);
   }
-  for (const auto& [stamp, evidence] : inbox.matches)
+  for (const auto& [stamp, evidence] : inputs.matches)
   {
     homing.addMatches(stamp, evidence.pairs, evidence.weights);
   }
-  if (inbox.frame)
+  if (inputs.frame)
   {
-    homing.addImage(inbox.frame->image->header.stamp.toSec(), toGrey(*inbox.frame->image, image_topic_));
+    homing.addImage(inputs.frame->image->header.stamp.toSec(), toGrey(*inputs.frame->image, image_topic_));
   }
 }
 

@@ -50,11 +50,7 @@ geometry_msgs::Pose toPose(const Eigen::Isometry3d& pose)
   message.position.x = pose.translation().x();
   message.position.y = pose.translation().y();
   message.position.z = pose.translation().z();
-  const Eigen::Quaterniond q(pose.linear());
-  message.orientation.x = q.x();
-  message.orientation.y = q.y();
-  message.orientation.z = q.z();
-  message.orientation.w = q.w();
+  message.orientation = toMessage(Eigen::Quaterniond(pose.linear()));
   return message;
 }
 

@@ -13,6 +13,7 @@
 #include "view_servo/views/view_store.h"
 
 #include <geometry_msgs/PoseStamped.h>
+#include <geometry_msgs/Quaternion.h>
 #include <geometry_msgs/Transform.h>
 #include <geometry_msgs/TransformStamped.h>
 #include <geometry_msgs/Vector3.h>
@@ -91,5 +92,6 @@ Eigen::Isometry3d toIsometry(const geometry_msgs::Transform& transform);
 
 Eigen::Vector3d toVector(const geometry_msgs::Vector3& vector);
 geometry_msgs::Vector3 toMessage(const Eigen::Vector3d& vector);
+geometry_msgs::Quaternion toMessage(const Eigen::Quaterniond& rotation);
 
 }  // namespace view_servo

@@ -63,23 +63,23 @@ public:
   void addFrame(const CameraFrame& frame);
 
 private:
-  struct Inbox
+  struct Inputs
   {
-    std::optional<std::shared_ptr<HomingTask>> task;      ///< to which the rest of the inbox belongs; empty: as before
+    std::optional<std::shared_ptr<HomingTask>> task;      ///< to which the rest of the inputs belongs; empty: as before
     std::vector<std::pair<double, PlanarPose>> odometry;  ///< by stamp [s]
     std::vector<std::pair<double, HeadingEvidence>> matches;  ///< by stamp [s]
     std::optional<CameraFrame> frame;                         ///< the newest
     std::chrono::steady_clock::time_point frame_time;
   };
 
-  void work(const Inbox& inbox);
-  void add(const Inbox& inbox, Homing& homing) const;
+  void work(const Inputs& inputs);
+  void add(const Inputs& inputs, Homing& homing) const;
 
   const std::string image_topic_;
   const std::function<void(const HomingOutcome&)> on_outcome_;
   const std::function<void(const CameraFrame&)> on_idle_frame_;
   std::shared_ptr<HomingTask> task_;  // the thread's alone
-  Worker<Inbox> worker_;
+  Worker<Inputs> worker_;
 };
 
 }  // namespace view_servo

@@ -105,7 +105,7 @@ struct MatchLabel
  *  - `static void fill(const Result&, Service::Response&)`, for the fields that are the service's own; success and
  *    message are set before, and may be changed;
  *  - `static Message toMessage(const Result&, const MatchLabel&)`, whose reason is the match's message when nothing was
- *    found.
+ *    found; its own header, view, goal and refused are set afterwards, from the label.
  */
 template <typename Matching>
 class StreamingMatcher : private NodeBase
@@ -346,7 +346,7 @@ private:
                                   toCamera(*frame.info) };
       const typename Matching::Result result =
           matching_.match(reference, current, typename Matching::Options(), given_up_);
-      matches_publisher_.publish(Matching::toMessage(result, label));
+      publish(result, label);
       if (wants_overlay)
       {
         overlay_publisher_.publish(overlay(*reference.image, *current.image, result, label.header));
@@ -359,11 +359,21 @@ private:
     }
   }
 
+  void publish(const typename Matching::Result& result, const MatchLabel& label)
+  {
+    typename Matching::Message message = Matching::toMessage(result, label);
+    message.header = label.header;
+    message.view = label.chosen.view;
+    message.goal = label.chosen.goal;
+    message.refused = label.refused;
+    matches_publisher_.publish(message);
+  }
+
   LastResult publishFailure(const MatchLabel& label, const std::string& reason)
   {
     typename Matching::Result nothing;
     nothing.message = reason;
-    matches_publisher_.publish(Matching::toMessage(nothing, label));
+    publish(nothing, label);
     ROS_ERROR_STREAM_THROTTLE(10.0, "camera images are not matched: " << reason);
     return { true, reason };
   }

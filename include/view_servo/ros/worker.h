@@ -14,19 +14,19 @@
 namespace view_servo
 {
 /**
- * A thread that works on what others put into its inbox, so that they need not wait. It takes the whole inbox at once.
- * The type `Inbox`, default-constructed empty, defines how inputs gather there. While the lock is held, only the edits
+ * A thread that works on inputs that others put there, so that they need not wait. It takes all of them at once.
+ * The type `Inputs`, default-constructed empty, defines how inputs gather there. While the lock is held, only the edits
  * of put() are called.
  */
-template <typename Inbox>
+template <typename Inputs>
 class Worker
 {
 public:
   /**
-   * @param what the thread does, for the log. @param work called by the thread with each inbox; what it throws is
+   * @param what the thread does, for the log. @param work called by the thread with all inputs; what it throws is
    * logged.
    */
-  Worker(std::string what, std::function<void(Inbox&&)> work) : what_(std::move(what)), work_(std::move(work))
+  Worker(std::string what, std::function<void(Inputs&&)> work) : what_(std::move(what)), work_(std::move(work))
   {
     thread_ = std::thread([this] { run(); });
   }
@@ -42,13 +42,13 @@ public:
   Worker(const Worker&) = delete;
   Worker& operator=(const Worker&) = delete;
 
-  /** Edits the inbox and wakes the thread. @param edit has to be quick, and must not call put(). */
+  /** Edits the inputs and wakes the thread. @param edit has to be quick, and must not call put(). */
   template <typename Edit>
   void put(const Edit& edit)
   {
     {
       const std::lock_guard<std::mutex> lock(mutex_);
-      edit(inbox_);
+      edit(inputs_);
       full_ = true;
     }
     wake_.notify_all();
@@ -66,18 +66,18 @@ private:
         return;
       }
       full_ = false;
-      Inbox inbox = std::exchange(inbox_, Inbox());
+      Inputs inputs = std::exchange(inputs_, Inputs());
       lock.unlock();
-      guarded(what_, [&] { work_(std::move(inbox)); });
+      guarded(what_, [&] { work_(std::move(inputs)); });
       lock.lock();
     }
   }
 
   const std::string what_;
-  const std::function<void(Inbox&&)> work_;
+  const std::function<void(Inputs&&)> work_;
   std::mutex mutex_;  // guards what follows
   std::condition_variable wake_;
-  Inbox inbox_;
+  Inputs inputs_;
   bool full_ = false;
   bool stopping_ = false;
   std::thread thread_;
