@@ -11,6 +11,7 @@
 #include "experiments/arm_geometry_experiment.h"
 #include "experiments/cyclic_order_experiment.h"
 #include "experiments/experiment_context.h"
+#include "experiments/false_answers_experiment.h"
 #include "experiments/homing_experiments.h"
 #include "experiments/hypothesis_experiments.h"
 #include "experiments/line_ground_truth.h"
@@ -72,6 +73,8 @@ const std::vector<Experiment>& experiments()
       VIEW_CONSISTENCY_RUNS, runViewConsistencyExperiment },
     { "rooms", "fundamental matrices between real views of rooms and buildings, beside SIFT and AKAZE", true,
       std::nullopt, runRoomsExperiment },
+    { "false_answers", "answers for pictures of different scenes, mirrored ones and walls that repeat", true,
+      UNRELATED_PAIRS, runFalseAnswersExperiment },
     { "arm_geometry", "chapter 8: motions from homographies beside a real arm's", true, std::nullopt,
       runArmGeometryExperiment },
     { "cyclic_order", "figures 7.5 to 7.11: cyclic order against plain votes", false, DRAWN_PICTURES,

@@ -355,18 +355,16 @@ void runRealPairsExperiment(const ExperimentContext& context, std::ostream& csv)
     GeometryModel model;
   };
   std::vector<Images> all;
-  for (const char* name : { "booksh", "box", "castle", "corr", "kampa", "plant", "valbonne", "wash" })
+  for (const std::string& name : kusvodPairs())
   {
     all.push_back({ "kusvod2", name, GeometryModel::FUNDAMENTAL });
   }
-  for (const char* name : { "biscuitbookbox", "book", "cubetoy" })
+  for (const GeometryModel model : { GeometryModel::FUNDAMENTAL, GeometryModel::HOMOGRAPHY })
   {
-    all.push_back({ "adelaidermf", name, GeometryModel::FUNDAMENTAL });
-  }
-  for (const char* name :
-       { "barrsmith", "bonhall", "elderhalla", "johnssona", "ladysymon", "library", "napiera", "sene" })
-  {
-    all.push_back({ "adelaidermf", name, GeometryModel::HOMOGRAPHY });
+    for (const std::string& name : adelaidePairs(model))
+    {
+      all.push_back({ "adelaidermf", name, model });
+    }
   }
   if (context.brief)
   {

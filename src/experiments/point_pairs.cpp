@@ -5,6 +5,7 @@
 #include "experiments/input_file.h"
 #include "view_servo/geometry/fundamental.h"
 #include "view_servo/geometry/homography.h"
+#include "view_servo/geometry/region.h"
 #include "view_servo/images/image_io.h"
 
 #include <Eigen/Geometry>
@@ -12,6 +13,7 @@
 #include <opencv2/imgproc.hpp>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <fstream>
 #include <limits>
@@ -40,13 +42,6 @@ fs::path imageFile(const fs::path& stem)
     }
   }
   throw std::runtime_error("there is no image " + stem.string() + ".*");
-}
-
-Points cornersOf(const cv::Size& size)
-{
-  const double right = size.width - 1.0;
-  const double bottom = size.height - 1.0;
-  return { { 0.0, 0.0 }, { right, 0.0 }, { right, bottom }, { 0.0, bottom } };
 }
 
 /** The ground truth of a scene with depth: the fundamental matrix of its points. */
@@ -98,6 +93,14 @@ const std::vector<std::string>& kusvodPairs()
   static const std::vector<std::string> names = { "booksh", "box",   "castle",   "corr",
                                                   "kampa",  "plant", "valbonne", "wash" };
   return names;
+}
+
+const std::vector<std::string>& adelaidePairs(GeometryModel model)
+{
+  static const std::vector<std::string> planes = { "barrsmith", "bonhall", "elderhalla", "johnssona",
+                                                   "ladysymon", "library", "napiera",    "sene" };
+  static const std::vector<std::string> motions = { "biscuitbookbox", "book", "cubetoy" };
+  return model == GeometryModel::HOMOGRAPHY ? planes : motions;
 }
 
 PointPair readOxfordPair(const fs::path& data, const std::string& sequence, int number)
@@ -375,7 +378,8 @@ PointPair renderPair(Surface surface, const cv::Mat& picture, double angle, std:
   pair.error = [place](const Correspondence& match) {
     return (place(match.reference) - match.current).norm();
   };
-  Points pixels = cornersOf(pair.reference.size());
+  const std::array<Eigen::Vector2d, 4> corners = cornersOf(pair.reference.size());
+  Points pixels(corners.begin(), corners.end());
   if (surface == Surface::CYLINDER)
   {
     pixels.clear();

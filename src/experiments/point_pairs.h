@@ -35,9 +35,10 @@ struct PointPair
   double geometryError(GeometryModel kind, const Eigen::Matrix3d& matrix) const;
 };
 
-/** Names of what the folders oxford_affine and kusvod2 hold. */
+/** Names of what the folders oxford_affine, kusvod2 and adelaidermf hold; of the last with planes or with motions. */
 const std::vector<std::string>& oxfordSequences();
 const std::vector<std::string>& kusvodPairs();
+const std::vector<std::string>& adelaidePairs(GeometryModel model);
 
 /**
  * Image 1 and another one of a sequence of the folder oxford_affine, related by a homography. `points` are the corners

@@ -14,7 +14,6 @@
 #include "view_servo/views/scene_matcher.h"
 
 #include <Eigen/LU>
-#include <Eigen/QR>
 #include <opencv2/calib3d.hpp>
 #include <opencv2/core.hpp>
 #include <opencv2/core/eigen.hpp>
@@ -56,8 +55,11 @@ struct RoomPair
   cv::Mat current;
   double baseline = std::numeric_limits<double>::quiet_NaN();  ///< [m]
   double rotation = std::numeric_limits<double>::quiet_NaN();  ///< [degrees]
-  /** True matches, at which answers are measured; may depend on what all answers found. */
-  std::function<Correspondences(const std::vector<Answer>&)> truth;
+  /**
+   * True matches, at which answers are measured; may depend on what all answers found. Where things have moved apart,
+   * each motion has its own.
+   */
+  std::function<std::vector<Correspondences>(const std::vector<Answer>&)> truth;
 };
 
 // -------------------------------------------------------------------------------------------------------- the pairs
@@ -86,7 +88,8 @@ struct WalkPair
     Eigen::Matrix<double, 3, 2> rays;
     rays << current_from_reference.linear() * (inverse * match.reference.homogeneous()),
         -(inverse * match.current.homogeneous());
-    const Eigen::Vector2d depths = rays.colPivHouseholderQr().solve(-translation);
+    const Eigen::Matrix2d square = rays.transpose() * rays;
+    const Eigen::Vector2d depths = square.inverse() * (rays.transpose() * -translation);
     return depths.minCoeff() > 0.0;
   }
 
@@ -164,7 +167,7 @@ std::vector<RoomPair> walkPairs(const fs::path& data)
     const WalkPair motion{ walk.camera, walk.poses.at(known.current).inverse() * walk.poses.at(known.reference),
                            pair.reference.size() };
     pair.truth = [motion](const std::vector<Answer>& answers) {
-      return trueMatches(motion, answers);
+      return std::vector<Correspondences>{ trueMatches(motion, answers) };
     };
     pair.baseline = known.baseline;
     pair.rotation = known.rotation;
@@ -173,15 +176,21 @@ std::vector<RoomPair> walkPairs(const fs::path& data)
   return pairs;
 }
 
-RoomPair toRoomPair(const std::string& set, PointPair&& pair)
+/** @param motions the same two pictures, with the true matches of one motion each. */
+RoomPair toRoomPair(const std::string& set, const std::vector<PointPair>& motions)
 {
   RoomPair result;
   result.set = set;
-  result.name = pair.name;
-  result.reference = pair.reference;
-  result.current = pair.current;
-  result.truth = [points = std::move(pair.points)](const std::vector<Answer>&) {
-    return points;
+  result.name = motions.front().name;
+  result.reference = motions.front().reference;
+  result.current = motions.front().current;
+  std::vector<Correspondences> truth;
+  for (const PointPair& motion : motions)
+  {
+    truth.push_back(motion.points);
+  }
+  result.truth = [truth](const std::vector<Answer>&) {
+    return truth;
   };
   return result;
 }
@@ -191,7 +200,23 @@ std::vector<RoomPair> allPairs(const fs::path& data)
   std::vector<RoomPair> pairs = walkPairs(data);
   for (const std::string& name : kusvodPairs())
   {
-    pairs.push_back(toRoomPair("kusvod2", readKusvodPair(data, name)));
+    pairs.push_back(toRoomPair("kusvod2", { readKusvodPair(data, name) }));
+  }
+  for (const std::string& name : adelaidePairs(GeometryModel::FUNDAMENTAL))
+  {
+    pairs.push_back(toRoomPair("adelaidermf", readAdelaidePairs(data, GeometryModel::FUNDAMENTAL, name)));
+  }
+  for (const std::string& name : adelaidePairs(GeometryModel::HOMOGRAPHY))
+  {
+    PointPair all;
+    for (const PointPair& plane : readAdelaidePairs(data, GeometryModel::HOMOGRAPHY, name))
+    {
+      Correspondences points = std::move(all.points);
+      points.insert(points.end(), plane.points.begin(), plane.points.end());
+      all = plane;
+      all.points = std::move(points);
+    }
+    pairs.push_back(toRoomPair("adelaidermf", { all }));
   }
   return pairs;
 }
@@ -300,14 +325,20 @@ std::vector<Method> ours()
             } } };
 }
 
-double errorOf(const Answer& answer, const Correspondences& truth)
+/** Mean Sampson distance of true matches; of the motion that an answer fits best. NaN without an answer. */
+double errorOf(const Answer& answer, const std::vector<Correspondences>& truth)
 {
-  double sum = 0.0;
-  for (const Correspondence& match : truth)
+  double least = std::numeric_limits<double>::quiet_NaN();
+  for (const Correspondences& motion : truth)
   {
-    sum += answer.f ? std::sqrt(sampsonError(*answer.f, match)) : std::numeric_limits<double>::quiet_NaN();
+    double sum = 0.0;
+    for (const Correspondence& match : motion)
+    {
+      sum += answer.f ? std::sqrt(sampsonError(*answer.f, match)) : std::numeric_limits<double>::quiet_NaN();
+    }
+    least = std::fmin(least, sum / static_cast<double>(motion.size()));
   }
-  return sum / static_cast<double>(truth.size());
+  return least;
 }
 
 struct Summary
@@ -346,7 +377,7 @@ void runRoomsExperiment(const ExperimentContext& context, std::ostream& csv)
       answers.push_back(method.second(pair));
       times.push_back(1e3 * static_cast<double>(std::clock() - begin) / CLOCKS_PER_SEC);
     }
-    const Correspondences truth = pair.truth(answers);
+    const std::vector<Correspondences> truth = pair.truth(answers);
     std::cerr << pair.set << ' ' << pair.name << ':';
     for (std::size_t i = 0; i < methods.size(); ++i)
     {

@@ -71,7 +71,7 @@ TEST(Experiments, RefusesRunsWhereNothingIsRepeated)
     expectContains(outcome.err, "--runs: " + name + " repeats nothing");
     expectContains(outcome.err,
                    "homing, arm, multi_hypothesis, real_pairs, profiles_parameters, view_consistency, "
-                   "cyclic_order do");
+                   "false_answers, cyclic_order do");
   }
 }
 
