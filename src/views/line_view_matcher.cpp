@@ -2,6 +2,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "view_servo/views/line_view_matcher.h"
 
+#include "mirror.h"
 #include "repetition.h"
 #include "stage_clock.h"
 #include "view_servo/features/side_correlation.h"
@@ -33,6 +34,9 @@ namespace
 constexpr double NOT_A_NUMBER = std::numeric_limits<double>::quiet_NaN();
 /** Support that the best region must have: of 128 pairs of unrelated images none had one of more than 5.6. */
 constexpr double BEYOND_CHANCE = 7.0;
+// Symmetric things in a mirrored image, as a chessboard, have matched with this significance.
+constexpr double BEYOND_MIRRORS = 120.0;
+constexpr int HALF_SIZE = 2;  // level of a PreparedImage: to find corners in the full one takes too long
 
 /** How sure a match is: the mean of what the segments share and of how alike their surroundings look. */
 double quality(const SegmentMatch& match)
@@ -500,6 +504,7 @@ std::vector<Parameter> rowsOfLines(LineMatcherParams& params)
     real("min_significance", params.min_log_significance, "", ">= 0",
          "-log10 of the probability that chance matches as many lines"),
     boolean("unique", params.unique, "refuse a view that fits at another place nearly as well"),
+    boolean("refuse_mirrored", params.refuse_mirrored, "refuse an image that shows the view better when mirrored"),
     real("min_parallax", params.min_log_parallax, "", ">= 0",
          "-log10 of the false alarms a fundamental matrix may have off each plane"),
     natural("seed", params.seed, "of all random draws"),
@@ -548,6 +553,20 @@ ViewMatch LineViewMatcher::match(const PreparedImage& reference, const PreparedI
   current.lines();
   clock.finish("current");
   ViewMatch result = match(reference.lines(), current.lines(), model, groups);
+  if (result.outcome == MatchOutcome::MATCHED && params_.refuse_mirrored && result.log_significance < BEYOND_MIRRORS)
+  {
+    StageClock mirror_clock(result.stages);
+    Rng rng(params_.seed);
+    if (isMirrored(reference, HALF_SIZE, current, HALF_SIZE, rng))
+    {
+      result.outcome = MatchOutcome::NO_GEOMETRY;
+      result.message = MIRRORED;
+      result.matrix.setConstant(NOT_A_NUMBER);
+      result.rms_error = NOT_A_NUMBER;
+      result.inliers = 0;
+    }
+    mirror_clock.finish("mirror");
+  }
   if (result.outcome != MatchOutcome::MATCHED)
   {
     result.message += noteOfLight(reference, current);

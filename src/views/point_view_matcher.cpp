@@ -2,9 +2,11 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "view_servo/views/point_view_matcher.h"
 
+#include "mirror.h"
 #include "pair_geometry.h"
 #include "repetition.h"
 #include "stage_clock.h"
+#include "view_servo/geometry/homography.h"
 #include "view_servo/parameters/faults.h"
 #include "view_servo/robust/orientation.h"
 #include "view_servo/robust/significance.h"
@@ -51,6 +53,11 @@ struct LevelTrial
 // A geometry from a share of the profiles ends the search only if it is beyond doubt, as most are; in the others the rest
 // of the profiles may find a better one.
 constexpr double BEYOND_DOUBT = 10.0;  // times the significance asked for
+
+// A symmetric thing that matches in a mirrored image does so with less than this significance or, where it is large, with
+// much around it that does not match.
+constexpr double BEYOND_MIRRORS = 60.0;
+constexpr double MOST_CANDIDATES = 0.5;
 
 std::vector<LevelTrial> levelTrials(const PointViewMatcherParams& params)
 {
@@ -255,6 +262,14 @@ public:
       inliers_.clear();
       return false;
     }
+    constexpr double CLEARLY = 1.75;
+    rivalled_ = params_.unique &&
+                static_cast<double>(agreeing) < CLEARLY * partOfRivals(fit->matrix) * static_cast<double>(pairs.size());
+    if (rivalled_)
+    {
+      inliers_.clear();
+      return false;
+    }
     const Eigen::Matrix3d refined = geometry_.refine(fit->matrix, supporting);
     const std::optional<Eigen::Matrix3d> settled = geometry_.settle(refined, pairs, rng);
     left_open_ = !settled;
@@ -270,6 +285,20 @@ public:
     }
     pairs_ = std::move(pairs);
     return true;
+  }
+
+  /** The part of the candidates that agrees with the geometry. */
+  double agreeingPart() const
+  {
+    const auto agreeing = std::count_if(pairs_.begin(), pairs_.end(),
+                                        [&](const Correspondence& pair) { return geometry_.agrees(matrix_, pair); });
+    return static_cast<double>(agreeing) / static_cast<double>(pairs_.size());
+  }
+
+  /** Whether there was a geometry, and other places that look like the candidates' agree with it nearly as often. */
+  bool rivalled() const
+  {
+    return rivalled_;
   }
 
   /** Whether there was a geometry, and the candidates do not determine it. */
@@ -309,7 +338,7 @@ public:
     }
   }
 
-  /** Whether what agrees with the geometry is found elsewhere nearly as well. */
+  /** Whether what agrees with the geometry is found elsewhere nearly as well, in the full images: periods may be small. */
   bool isRepeated(Rng& rng) const
   {
     Correspondences pairs;
@@ -318,7 +347,19 @@ public:
       pairs.push_back(level_.correspondence(match));
     }
     const std::optional<Eigen::Matrix3d> plane = geometry_.mainPlane(matrix_, pairs, rng);
-    return plane && otherPlace(level_.reference_image, level_.current_image, pairs, to_.corners, *plane);
+    if (!plane)
+    {
+      return false;
+    }
+    const Eigen::Matrix3d reference_map = reference_.toFull(levels_.reference);
+    const Eigen::Matrix3d current_map = current_.toFull(levels_.current);
+    for (Correspondence& pair : pairs)
+    {
+      pair = { transfer(reference_map, pair.reference), transfer(current_map, pair.current) };
+    }
+    return otherPlace(reference_.grey(), current_.grey(), pairs, current_.points(0).corners,
+                      current_map * *plane * reference_map.inverse())
+        .has_value();
   }
 
   /** Writes what was found in the pixels of the full images: inliers, and the candidates of all other corners. */
@@ -367,6 +408,40 @@ public:
   }
 
 private:
+  /**
+   * Of the reference corners whose candidates agree with a matrix: the part that agrees, too, of the other places that look
+   * nearly as much like them. On tiles or windows in rows these are places a number of periods off; and where an epipolar
+   * line runs along a row, it passes many of them, whether it is right or not.
+   */
+  double partOfRivals(const Eigen::Matrix3d& matrix) const
+  {
+    constexpr double ALIKE = 0.5;   // of the candidate's weight
+    constexpr double APART = 15.0;  // [px]: corners that are nearer are of the same thing
+    constexpr int ENOUGH = 20;
+    std::vector<const CornerMatch*> of_row(from_.corners.size(), nullptr);
+    for (const CornerMatch& candidate : candidates_)
+    {
+      if (geometry_.agrees(matrix, level_.correspondence(candidate)))
+      {
+        of_row[static_cast<std::size_t>(candidate.row)] = &candidate;
+      }
+    }
+    int rivals = 0;
+    int agreeing = 0;
+    for (const Association& entry : association_.entries())
+    {
+      const CornerMatch* candidate = of_row[static_cast<std::size_t>(entry.row)];
+      const CornerMatch rival = level_.toMatch(entry);
+      if (candidate != nullptr && rival.score >= ALIKE * candidate->score &&
+          (rival.current - candidate->current).norm() > APART)
+      {
+        rivals += 1;
+        agreeing += geometry_.agrees(matrix, level_.correspondence(rival)) ? 1 : 0;
+      }
+    }
+    return rivals >= ENOUGH ? static_cast<double>(agreeing) / rivals : 0.0;
+  }
+
   /** Makes those inliers that agree with the geometry. */
   void keepAgreeing(const std::vector<CornerMatch>& matches)
   {
@@ -390,6 +465,7 @@ private:
   Correspondences pairs_;  ///< candidates_ of a geometry that was accepted
   Eigen::Matrix3d matrix_;
   bool left_open_ = false;
+  bool rivalled_ = false;
 };
 
 }  // namespace
@@ -430,6 +506,8 @@ std::vector<Parameter> parameters(PointViewMatcherParams& params)
           real("min_significance", params.min_log_significance, "", ">= 0",
                "-log10 of the false alarms a geometry may have"),
           boolean("unique", params.unique, "refuse a view that fits at another place nearly as well"),
+          boolean("refuse_mirrored", params.refuse_mirrored,
+                  "refuse an image that shows the view better when mirrored"),
           real("min_parallax", params.min_log_parallax, "", ">= 0",
                "-log10 of the false alarms a fundamental matrix may have off its best plane"),
           natural("seed", params.seed, "of all random draws"),
@@ -473,6 +551,7 @@ ViewMatch PointViewMatcher::match(const PreparedImage& reference, const Prepared
   bool ended_early = false;
   bool left_open = false;
   bool repeated = false;
+  bool mirrored = false;
   TrialQueue trials(reference, current, params_);
   while (!(ended_early = given_up && given_up()))
   {
@@ -492,6 +571,7 @@ ViewMatch PointViewMatcher::match(const PreparedImage& reference, const Prepared
     }
     any_features = true;
     bool accepted = attempt.run(result, clock, rng);
+    repeated = attempt.rivalled();
     if (accepted && params_.guided)
     {
       attempt.guide(rng);
@@ -503,13 +583,20 @@ ViewMatch PointViewMatcher::match(const PreparedImage& reference, const Prepared
       accepted = !repeated;
       clock.finish("unique");
     }
+    if (accepted && params_.refuse_mirrored &&
+        (result.log_significance < BEYOND_MIRRORS || attempt.agreeingPart() < MOST_CANDIDATES))
+    {
+      mirrored = isMirrored(reference, trial->levels.reference, current, trial->levels.current, rng);
+      accepted = !mirrored;
+      clock.finish("mirror");
+    }
     if (accepted || (trial->levels.reference == 0 && trial->levels.current == 0))
     {
       // Without a geometry, the candidates of the full images are reported.
       attempt.report(accepted, result);
     }
     left_open = attempt.leftOpen();
-    if (accepted || repeated || (left_open && trial->share == params_.points.search.share))
+    if (accepted || repeated || mirrored || (left_open && trial->share == params_.points.search.share))
     {
       break;  // what repeats itself at this scale, or lies on one plane, does at others
     }
@@ -527,6 +614,10 @@ ViewMatch PointViewMatcher::match(const PreparedImage& reference, const Prepared
   else if (repeated)
   {
     result.message = REPEATED;
+  }
+  else if (mirrored)
+  {
+    result.message = MIRRORED;
   }
   else if (left_open)
   {

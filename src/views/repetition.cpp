@@ -5,6 +5,7 @@
 #include "view_servo/geometry/homography.h"
 #include "view_servo/matching/guided_matching.h"
 
+#include <Eigen/LU>
 #include <opencv2/imgproc.hpp>
 
 #include <algorithm>
@@ -23,6 +24,13 @@ constexpr double MIN_CORRELATION = 0.7;  // of a corner's patch that is found
 constexpr double NEARLY = 0.85;          // of the part of the matches that is found where it should be
 constexpr double LEAST_FOUND = 0.4;      // of the matches: too few tell nothing
 constexpr double APART = 8.0;            // nearer places are one [px]
+
+Eigen::Matrix3d shift(const Eigen::Vector2d& by)
+{
+  Eigen::Matrix3d result = Eigen::Matrix3d::Identity();
+  result.topRightCorner<2, 1>() = by;
+  return result;
+}
 
 /** Patches of an image of half the size, around some of its places: 34 px wide and high in the full image. */
 class Surroundings
@@ -130,37 +138,43 @@ public:
   std::optional<Eigen::Matrix3d> moved(const Eigen::Matrix3d& h, const Eigen::Vector2d& from,
                                        const Eigen::Vector2d& to) const
   {
-    constexpr double AROUND = 80.0;  // [px]
-    constexpr double WIDER = 6.0;    // than RADIUS: the period is not the same everywhere [px]
+    constexpr double WIDER = 6.0;  // than RADIUS: the period is not the same everywhere [px]
     constexpr std::size_t FEWEST = 6;
-    constexpr int ROUNDS = 3;
-    std::vector<Corner> around;
-    for (std::size_t i = 0; i < corners_.size(); ++i)
+    constexpr std::size_t MOST = 20;
+    constexpr double EVERYWHERE = 1e5;  // [px]
+    std::vector<Corner> around = near(from, 120.0);
+    around.resize(std::min(around.size(), MOST));
+    const double here = static_cast<double>(find(around, h, RADIUS).size());
+    // Either image may show the plane from straight ahead, where a period is the same everywhere.
+    const Eigen::Matrix3d inverse = h.inverse();
+    const Eigen::Matrix3d in_current = shift(to - from) * h;
+    const Eigen::Matrix3d in_reference = h * shift(transfer(inverse, to) - transfer(inverse, from));
+    Eigen::Matrix3d other;
+    Correspondences found;
+    for (const Eigen::Matrix3d* start : { &in_reference, &in_current })
     {
-      if ((here_[i] - from).norm() < AROUND)
+      other = *start;
+      found = find(around, other, WIDER);
+      if (found.size() >= FEWEST && static_cast<double>(found.size()) >= NEARLY * here)
       {
-        around.push_back(corners_[i]);
+        break;
       }
     }
-    Eigen::Matrix3d shift = Eigen::Matrix3d::Identity();
-    shift.topRightCorner<2, 1>() = to - from;
-    Eigen::Matrix3d other = shift * h;
-    Correspondences found = find(around, other, WIDER);
-    const double here = static_cast<double>(find(around, h, RADIUS).size());
     if (found.size() < FEWEST || static_cast<double>(found.size()) < NEARLY * here)
     {
       return std::nullopt;
     }
-    for (int round = 0; round < ROUNDS; ++round)
+    for (const double reach : { 240.0, EVERYWHERE, EVERYWHERE })
     {
-      other = refineHomography(other, found, HUBER_WIDTH);
-      found = find(corners_, other, RADIUS);
-      if (found.size() < FEWEST)
+      other = improved(other, found);
+      const std::vector<Corner> within = near(from, reach);
+      found = find(within, other, RADIUS);
+      if (found.size() < FEWEST || static_cast<double>(found.size()) < LEAST_FOUND * static_cast<double>(within.size()))
       {
         return std::nullopt;
       }
     }
-    return other;
+    return improved(other, found);
   }
 
   /** Whether nearly as large a part is found along another homography as along `h`, and elsewhere. */
@@ -176,6 +190,36 @@ public:
   }
 
 private:
+  /** The homography that fits best to where corners are found, or, to a few of them, that is shifted best. */
+  static Eigen::Matrix3d improved(const Eigen::Matrix3d& h, const Correspondences& found)
+  {
+    constexpr std::size_t ENOUGH = 16;
+    if (found.size() >= ENOUGH)
+    {
+      return refineHomography(h, found, HUBER_WIDTH);
+    }
+    Eigen::Vector2d off = Eigen::Vector2d::Zero();
+    for (const Correspondence& pair : found)
+    {
+      off += (pair.current - transfer(h, pair.reference)) / static_cast<double>(found.size());
+    }
+    return shift(off) * h;
+  }
+
+  /** Those that are seen within so many pixels of a place in the current image. */
+  std::vector<Corner> near(const Eigen::Vector2d& place, double reach) const
+  {
+    std::vector<Corner> corners;
+    for (std::size_t i = 0; i < corners_.size(); ++i)
+    {
+      if ((here_[i] - place).norm() < reach)
+      {
+        corners.push_back(corners_[i]);
+      }
+    }
+    return corners;
+  }
+
   Correspondences find(const std::vector<Corner>& corners, const Eigen::Matrix3d& h, double radius) const
   {
     Correspondences pairs;

@@ -2,6 +2,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "view_servo/views/scene_matcher.h"
 
+#include "mirror.h"
 #include "repetition.h"
 #include "stage_clock.h"
 #include "view_servo/geometry/fundamental.h"
@@ -179,18 +180,34 @@ public:
     return holds();
   }
 
-  /** Whether more than half of what agrees lies on one plane and is found elsewhere nearly as well. */
-  bool isRepeated() const
+  /** Whether what agrees lies for the most part on planes that are found elsewhere nearly as well. */
+  bool isRepeated()
   {
-    const Plane* best = bestPlane();
-    if (best == nullptr)
+    const auto repeats = [&](const Eigen::Matrix3d& h) {
+      return otherPlace(reference_.grey(), current_.grey(), onPlane(h), current_.points(0).corners, h).has_value();
+    };
+    if (!matrix_)
     {
-      return false;
+      return bestPlane() != nullptr && repeats(bestPlane()->h);
     }
-    const Correspondences on_plane = onPlane(best->h);
-    const std::size_t agree = matrix_ ? agreeing(*matrix_).size() : 0;
-    return 2 * on_plane.size() > agree &&
-           otherPlace(reference_.grey(), current_.grey(), on_plane, current_.points(0).corners, best->h);
+    // Along a row of windows a fundamental matrix agrees with all that are a whole number of windows off.
+    Correspondences unique = agreeing(*matrix_);
+    const std::size_t all = unique.size();
+    std::vector<Eigen::Matrix3d> planes = planesOf(unique, params_.inlier_threshold, rng_);
+    for (const Plane& plane : planes_)
+    {
+      planes.push_back(plane.h);
+    }
+    for (const Eigen::Matrix3d& h : planes)
+    {
+      if (repeats(h))
+      {
+        unique.erase(
+            std::remove_if(unique.begin(), unique.end(), [&](const Correspondence& pair) { return liesOn(h, pair); }),
+            unique.end());
+      }
+    }
+    return 2 * unique.size() < all;
   }
 
   /** The plane that corners confirm best, when it is beyond doubt and not mirrored. */
@@ -536,7 +553,9 @@ ViewMatch SceneMatcher::match(const PreparedImage& reference, const PreparedImag
   result.rms_error = NOT_A_NUMBER;
   StageClock clock(result.stages);
 
-  const ViewMatch lines = LineViewMatcher(params_.lines).match(reference, current, GeometryModel::FUNDAMENTAL);
+  LineMatcherParams line_params = params_.lines;
+  line_params.refuse_mirrored = false;  // that is asked of all together
+  const ViewMatch lines = LineViewMatcher(line_params).match(reference, current, GeometryModel::FUNDAMENTAL);
   clock.finish("lines");
   // Other scales are for where nothing else is.
   int trials = 0;
@@ -546,6 +565,7 @@ ViewMatch SceneMatcher::match(const PreparedImage& reference, const PreparedImag
   // Matches that were sought along one geometry would speak for that geometry.
   PointViewMatcherParams point_params = params_.points;
   point_params.guided = false;
+  point_params.refuse_mirrored = false;
   const ViewMatch points =
       PointViewMatcher(point_params).match(reference, current, GeometryModel::FUNDAMENTAL, 0.0, enough);
   clock.finish("points");
@@ -577,19 +597,23 @@ ViewMatch SceneMatcher::match(const PreparedImage& reference, const PreparedImag
   const std::optional<Eigen::Matrix3d> plane = found ? std::nullopt : attempt.plane();
   const bool repeated = (found || plane) && params_.points.unique && attempt.isRepeated();
   clock.finish("unique");
-  if (found && !repeated)
+  const bool mirrored =
+      (found || plane) && !repeated && params_.points.refuse_mirrored && isMirrored(reference, 0, current, 0, rng);
+  clock.finish("mirror");
+  const bool refused = repeated || mirrored;
+  if (found && !refused)
   {
     attempt.reportFundamental(lines.lines, result);
   }
-  else if (plane && !repeated)
+  else if (plane && !refused)
   {
     attempt.reportPlane(*plane, lines.lines, result);
   }
   attempt.reportCandidates(result);
   const std::string count = std::to_string(result.inliers) + " of " + std::to_string(result.matches.size());
-  if (repeated)
+  if (refused)
   {
-    result.message = REPEATED;
+    result.message = repeated ? REPEATED : MIRRORED;
   }
   else if (found)
   {

@@ -297,41 +297,6 @@ TEST(PointViewMatcher, FindsAPlaneThatIsSeenVeryObliquely)
   EXPECT_NE(matchImages(params, reference, current).outcome, MatchOutcome::MATCHED);
 }
 
-TEST(PointViewMatcher, FindsNothingInUnrelatedPictures)
-{
-  for (const GeometryModel model : { GeometryModel::HOMOGRAPHY, GeometryModel::FUNDAMENTAL })
-  {
-    for (int seed = 0; seed < 4; ++seed)
-    {
-      const ViewMatch match =
-          matchImages(PointViewMatcherParams(), texturedPicture(100 + seed), texturedPicture(200 + seed), model);
-      EXPECT_EQ(match.outcome, MatchOutcome::NO_GEOMETRY) << "seed " << seed << ": " << match.message;
-      EXPECT_EQ(match.inliers, 0);
-      EXPECT_TRUE(match.matrix.array().isNaN().all());
-      EXPECT_TRUE(std::isnan(match.rms_error));
-      for (const MatchedPoint& point : match.matches)
-      {
-        EXPECT_FALSE(point.inlier);
-      }
-    }
-  }
-}
-
-TEST(PointViewMatcher, FindsNothingInAMirroredPicture)
-{
-  for (const GeometryModel model : { GeometryModel::HOMOGRAPHY, GeometryModel::FUNDAMENTAL })
-  {
-    for (int seed = 0; seed < 2; ++seed)
-    {
-      const cv::Mat reference = texturedPicture(300 + seed);
-      cv::Mat mirrored;
-      cv::flip(reference, mirrored, 1);
-      const ViewMatch match = matchImages(PointViewMatcherParams(), reference, mirrored, model);
-      EXPECT_EQ(match.outcome, MatchOutcome::NO_GEOMETRY) << "seed " << seed << ": " << match.message;
-    }
-  }
-}
-
 TEST(PointViewMatcher, SaysWhenThereIsNothingToMatch)
 {
   const cv::Mat flat(SIZE, CV_8UC1, cv::Scalar(90));

@@ -39,10 +39,14 @@ cv::Mat wall(std::uint64_t seed, const cv::Size& size)
   return all(cv::Rect(cv::Point(), size)).clone();
 }
 
-cv::Mat photographed(const cv::Mat& picture)
+/** @param turn of the camera [degrees] */
+cv::Mat photographed(const cv::Mat& picture, double turn = 0.0)
 {
+  const cv::Point2f middle(0.5F * static_cast<float>(picture.cols), 0.5F * static_cast<float>(picture.rows));
   cv::Mat blurred;
-  cv::GaussianBlur(picture, blurred, cv::Size(), 0.8);
+  cv::warpAffine(picture, blurred, cv::getRotationMatrix2D(middle, turn, 1.0), picture.size(), cv::INTER_LINEAR,
+                 cv::BORDER_REPLICATE);
+  cv::GaussianBlur(blurred, blurred, cv::Size(), 0.8);
   return test::disturbed(blurred, 1.0, 0.0, 2.0);
 }
 
@@ -87,6 +91,17 @@ TEST_P(RepeatedWindows, AreRefusedByAll)
   EXPECT_NE(found.points.message.find("repeats itself"), std::string::npos) << found.points.message;
   EXPECT_NE(found.lines.message.find("repeats itself"), std::string::npos) << found.lines.message;
   EXPECT_NE(found.scene.message.find("repeats itself"), std::string::npos) << found.scene.message;
+}
+
+TEST_P(RepeatedWindows, AreRefusedByAllWhenTheCameraHasTurned)
+{
+  const cv::Mat picture = wall(GetParam(), SIZE + cv::Size(PERIOD, 0));
+  const Answers found = answers(photographed(picture(cv::Rect(cv::Point(0, 0), SIZE)), -2.0),
+                                photographed(picture(cv::Rect(cv::Point(PERIOD, 0), SIZE)), 2.0));
+  for (const ViewMatch& match : { found.points, found.points_with_depth, found.lines, found.scene })
+  {
+    EXPECT_EQ(match.outcome, MatchOutcome::NO_GEOMETRY) << match.message;
+  }
 }
 
 INSTANTIATE_TEST_SUITE_P(Walls, RepeatedWindows, testing::Values(1, 2, 3));

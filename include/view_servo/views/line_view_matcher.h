@@ -28,6 +28,7 @@ struct LineMatcherParams
   double min_quality = 0.5;           ///< least MatchedLine::score of a match
   double min_log_significance = 6.0;  ///< least ViewMatch::log_significance of a geometry that is accepted
   bool unique = true;                 ///< refuse a geometry when another one, a shift off, fits nearly as well
+  bool refuse_mirrored = true;        ///< for a PreparedImage: refuse a current one that shows the view better mirrored
   double min_log_parallax = 3.0;  ///< least Parallax::significance() of a fundamental matrix, off each of the planes
   std::uint64_t seed = 1;         ///< fixes all random draws
 

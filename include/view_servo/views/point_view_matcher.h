@@ -53,6 +53,7 @@ struct PointViewMatcherParams
   bool side_search = true;   ///< then try the reference as it would look from the sides
   double min_log_significance = 6.0;  ///< least ViewMatch::log_significance of a geometry that is accepted
   bool unique = true;                 ///< refuse a geometry when another one, a shift off, fits nearly as well
+  bool refuse_mirrored = true;        ///< refuse a current image that shows the reference better when mirrored
   double min_log_parallax = 3.0;      ///< least Parallax::significance() of a fundamental matrix, off its best plane
   std::uint64_t seed = 1;             ///< fixes all random draws
 

@@ -68,6 +68,10 @@ public:
   {
     return region_;
   }
+  const FeatureParams& params() const
+  {
+    return params_;
+  }
 
   /** The image of level `number`; ones that would be too small are empty, and so are their features. */
   const cv::Mat& image(int number) const;
