@@ -229,10 +229,9 @@ std::vector<Answer> match(const Pair& pair)
 
 void runFalseAnswersExperiment(const ExperimentContext& context, std::ostream& csv)
 {
-  constexpr int SHARE = 20;
   const Pictures pictures(context.data);
   const int unrelated = context.runsOf(UNRELATED_PAIRS);
-  const int others = std::max(1, unrelated / SHARE);
+  const int others = std::max(1, unrelated / 2);
   const std::size_t count = static_cast<std::size_t>(unrelated) + 2 * static_cast<std::size_t>(others);
   std::vector<std::string> names(count);
   std::vector<std::string> kinds(count);

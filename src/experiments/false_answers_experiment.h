@@ -8,8 +8,8 @@
 
 namespace view_servo
 {
-/** Pairs of pictures of different scenes; mirrored pictures and repeating walls are a twentieth of that each. */
-constexpr Repetition UNRELATED_PAIRS{ "unrelated pairs", 1000, 3, 1 };
+/** Pairs of pictures of different scenes; mirrored pictures and repeating walls are half as many each. */
+constexpr Repetition UNRELATED_PAIRS{ "unrelated pairs", 100, 2, 1 };
 
 /**
  * Pairs that no geometry relates, so that every answer is a false one: pictures of different scenes; a picture and the

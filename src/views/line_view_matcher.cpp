@@ -36,7 +36,7 @@ constexpr double NOT_A_NUMBER = std::numeric_limits<double>::quiet_NaN();
 constexpr double BEYOND_CHANCE = 7.0;
 // Symmetric things in a mirrored image, as a chessboard, have matched with this significance.
 constexpr double BEYOND_MIRRORS = 120.0;
-constexpr int HALF_SIZE = 2;  // level of a PreparedImage: to find corners in the full one takes too long
+constexpr double DOUBTFUL = 25.0;
 
 /** How sure a match is: the mean of what the segments share and of how alike their surroundings look. */
 double quality(const SegmentMatch& match)
@@ -557,7 +557,9 @@ ViewMatch LineViewMatcher::match(const PreparedImage& reference, const PreparedI
   {
     StageClock mirror_clock(result.stages);
     Rng rng(params_.seed);
-    if (isMirrored(reference, HALF_SIZE, current, HALF_SIZE, rng))
+    // Corners are found in less time in the images of half the size, but fewer.
+    const int level = result.log_significance < DOUBTFUL ? 0 : 2;
+    if (isMirrored(reference, level, current, level, rng))
     {
       result.outcome = MatchOutcome::NO_GEOMETRY;
       result.message = MIRRORED;
