@@ -36,7 +36,7 @@ constexpr double NOT_A_NUMBER = std::numeric_limits<double>::quiet_NaN();
 constexpr double BEYOND_CHANCE = 7.0;
 // Symmetric things in a mirrored image, as a chessboard, have matched with this significance.
 constexpr double BEYOND_MIRRORS = 120.0;
-constexpr double DOUBTFUL = 25.0;
+constexpr double DOUBTFUL = 25.0;  // a significance that calls for more care with that
 
 /** How sure a match is: the mean of what the segments share and of how alike their surroundings look. */
 double quality(const SegmentMatch& match)
@@ -474,6 +474,19 @@ bool isRepeated(const LineFeatures& reference, const LineFeatures& current, cons
   return otherPlace(reference.smoothed(), current.smoothed(), pairs, meetingPlaces(current), plane).has_value();
 }
 
+/** Makes it a result without a geometry; what it was made from stays. */
+void refuse(ViewMatch& result)
+{
+  result.outcome = MatchOutcome::NO_GEOMETRY;
+  result.matrix.setConstant(NOT_A_NUMBER);
+  result.rms_error = NOT_A_NUMBER;
+  result.inliers = 0;
+  for (MatchedPoint& match : result.matches)
+  {
+    match.inlier = false;
+  }
+}
+
 std::string whyNot(const LineFeatures& reference, const LineFeatures& current, const ViewMatch& result, bool by_chance)
 {
   if (result.outcome == MatchOutcome::TOO_FEW_FEATURES)
@@ -561,11 +574,8 @@ ViewMatch LineViewMatcher::match(const PreparedImage& reference, const PreparedI
     const int level = result.log_significance < DOUBTFUL ? 0 : 2;
     if (isMirrored(reference, level, current, level, rng))
     {
-      result.outcome = MatchOutcome::NO_GEOMETRY;
+      refuse(result);
       result.message = MIRRORED;
-      result.matrix.setConstant(NOT_A_NUMBER);
-      result.rms_error = NOT_A_NUMBER;
-      result.inliers = 0;
     }
     mirror_clock.finish("mirror");
   }
@@ -653,8 +663,11 @@ ViewMatch LineViewMatcher::match(const LineFeatures& reference, const LineFeatur
   }
   else
   {
-    const std::size_t fewest = std::min(reference.segments().size(), current.segments().size());
-    result.outcome = fewest < MIN_SEGMENTS ? MatchOutcome::TOO_FEW_FEATURES : MatchOutcome::NO_GEOMETRY;
+    refuse(result);
+    if (std::min(reference.segments().size(), current.segments().size()) < MIN_SEGMENTS)
+    {
+      result.outcome = MatchOutcome::TOO_FEW_FEATURES;
+    }
     result.message = repeated ? REPEATED : whyNot(reference, current, result, by_chance);
   }
   result.elapsed_ms = clock.total();

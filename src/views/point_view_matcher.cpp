@@ -262,7 +262,7 @@ public:
       inliers_.clear();
       return false;
     }
-    constexpr double CLEARLY = 1.75;
+    constexpr double CLEARLY = 1.75;  // walls of windows or tiles have had up to 1.65, rooms 1.9 and more
     rivalled_ = params_.unique &&
                 static_cast<double>(agreeing) < CLEARLY * partOfRivals(fit->matrix) * static_cast<double>(pairs.size());
     if (rivalled_)
@@ -379,7 +379,7 @@ public:
     for (const CornerMatch& match : inliers_)
     {
       used[static_cast<std::size_t>(match.row)] = 1;
-      add(match, true);
+      add(match, accepted);
     }
     for (const CornerMatch& candidate : candidates_)
     {

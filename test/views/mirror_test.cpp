@@ -11,6 +11,7 @@
 #include <opencv2/core.hpp>
 #include <opencv2/imgproc.hpp>
 
+#include <algorithm>
 #include <string>
 
 namespace view_servo
@@ -81,6 +82,8 @@ TEST(Mirror, IsRefusedWhereWhatIsSymmetricMatches)
     EXPECT_EQ(match.outcome, MatchOutcome::NO_GEOMETRY) << match.message;
     EXPECT_TRUE(match.matrix.hasNaN());
     EXPECT_EQ(match.inliers, 0);
+    EXPECT_TRUE(
+        std::none_of(match.matches.begin(), match.matches.end(), [](const auto& point) { return point.inlier; }));
   }
   EXPECT_NE((found.points.message + found.lines.message + found.scene.message).find("mirror"), std::string::npos)
       << found.points.message << '\n'

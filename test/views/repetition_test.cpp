@@ -11,6 +11,7 @@
 #include <opencv2/core.hpp>
 #include <opencv2/imgproc.hpp>
 
+#include <algorithm>
 #include <cstdint>
 #include <random>
 #include <string>
@@ -87,6 +88,8 @@ TEST_P(RepeatedWindows, AreRefusedByAll)
   {
     EXPECT_EQ(match.outcome, MatchOutcome::NO_GEOMETRY) << match.message;
     EXPECT_TRUE(match.matrix.hasNaN());
+    EXPECT_TRUE(
+        std::none_of(match.matches.begin(), match.matches.end(), [](const auto& point) { return point.inlier; }));
   }
   EXPECT_NE(found.points.message.find("repeats itself"), std::string::npos) << found.points.message;
   EXPECT_NE(found.lines.message.find("repeats itself"), std::string::npos) << found.lines.message;
