@@ -185,6 +185,7 @@ RoomPair toRoomPair(const std::string& set, const std::vector<PointPair>& motion
   result.reference = motions.front().reference;
   result.current = motions.front().current;
   std::vector<Correspondences> truth;
+  truth.reserve(motions.size());
   for (const PointPair& motion : motions)
   {
     truth.push_back(motion.points);

@@ -87,7 +87,7 @@ struct LineGroup
 {
   std::uint32_t key;            ///< equal keys: same structure; see tripletKey()
   float weight;                 ///< probability of the structure, (0, 1]
-  std::array<int, 3> segments;  ///< indices of its segments: those in one place correspond between two groups
+  std::array<int, 3> segments;  ///< their indices; in two groups, segments at the same place correspond
 };
 
 /**

@@ -28,7 +28,7 @@ struct ViewPose
 struct StoredView
 {
   std::string name;              ///< see isValidViewName()
-  cv::Mat image;                 ///< 8-bit grey
+  cv::Mat image;                 ///< 8-bit grey, as the camera took it, with the lens's distortion
   cv::Rect region;               ///< region of interest [px]; empty = the whole image
   std::optional<Camera> camera;  ///< its calibration; empty: not known
   double stamp = 0.0;            ///< when the image was taken [s since the epoch of its clock]
