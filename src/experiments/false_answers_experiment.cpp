@@ -141,7 +141,8 @@ private:
 cv::Mat drawWall(Rng& rng, bool windows, int period, const cv::Size& size)
 {
   const auto between = [&rng](int least, int most) {
-    return least + static_cast<int>(uniform(rng, 0.0, most - least + 1.0));
+    const int count = most - least + 1;
+    return least + static_cast<int>(uniformIndex(rng, static_cast<std::size_t>(count)));
   };
   cv::Mat element(period, period, CV_8UC1, cv::Scalar(between(20, 230)));
   if (windows)
