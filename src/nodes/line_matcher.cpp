@@ -82,7 +82,7 @@ public:
   static Message toMessage(const Result& result, const MatchLabel& /*label*/)
   {
     Message message;
-    message.reason = result.lines.empty() ? result.message : "";
+    message.reason = result.outcome == MatchOutcome::MATCHED ? "" : result.message;
     message.matches = toLineMatches(result.lines);
     message.points = toPointMatches(result.matches);
     return message;

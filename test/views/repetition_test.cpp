@@ -88,6 +88,7 @@ TEST_P(RepeatedWindows, AreRefusedByAll)
   {
     EXPECT_EQ(match.outcome, MatchOutcome::NO_GEOMETRY) << match.message;
     EXPECT_TRUE(match.matrix.hasNaN());
+    EXPECT_TRUE(match.fundamental.hasNaN());
     EXPECT_TRUE(
         std::none_of(match.matches.begin(), match.matches.end(), [](const auto& point) { return point.inlier; }));
   }
