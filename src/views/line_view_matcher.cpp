@@ -474,12 +474,11 @@ bool isRepeated(const LineFeatures& reference, const LineFeatures& current, cons
   return otherPlace(reference.smoothed(), current.smoothed(), pairs, meetingPlaces(current), plane).has_value();
 }
 
-/** Takes back the geometry that a result has, since it is not to be trusted; what it was made from stays. */
+/** Makes it a result without a geometry; what it was made from stays. */
 void refuse(ViewMatch& result)
 {
   result.outcome = MatchOutcome::NO_GEOMETRY;
   result.matrix.setConstant(NOT_A_NUMBER);
-  result.fundamental.setConstant(NOT_A_NUMBER);
   result.rms_error = NOT_A_NUMBER;
   result.inliers = 0;
   for (MatchedPoint& match : result.matches)
@@ -576,6 +575,7 @@ ViewMatch LineViewMatcher::match(const PreparedImage& reference, const PreparedI
     if (isMirrored(reference, level, current, level, rng))
     {
       refuse(result);
+      result.fundamental.setConstant(NOT_A_NUMBER);
       result.message = MIRRORED;
     }
     mirror_clock.finish("mirror");
@@ -664,9 +664,10 @@ ViewMatch LineViewMatcher::match(const LineFeatures& reference, const LineFeatur
   }
   else
   {
+    refuse(result);
     if (by_chance || repeated)
     {
-      refuse(result);
+      result.fundamental.setConstant(NOT_A_NUMBER);
     }
     if (std::min(reference.segments().size(), current.segments().size()) < MIN_SEGMENTS)
     {

@@ -13,6 +13,7 @@ import os
 import re
 import shlex
 import shutil
+import signal
 import subprocess
 import sys
 import tempfile
@@ -318,17 +319,21 @@ class Documented(unittest.TestCase):
         self.assertIn(status, (0, 1), text)
 
     def record_run(self, bag):
-        """Records what homing tells during a goal."""
+        """Records what homing tells during a goal, until that has ended."""
         if os.path.exists(bag):
             return
         base = self.graphs[0]
         base.run("rosservice call /view_store/save '{name: recorded}'", PATIENCE)
         base.run("rosservice call /homing/enable 'data: true'", PATIENCE)
-        recording = base.start("rosbag", "record", "--output-name=" + bag, "--duration=8", "/heading", "/status", "/odom",
-                               "/ground_truth", "/cmd_vel_stamped")
-        graph.wait_until("the recorder", lambda: any(node.startswith("/record") for node in
-                                                     base.state()[1].get("/heading", [])))
+        recording = base.start("rosbag", "record", "--output-name=" + bag, "/heading", "/status", "/odom", "/ground_truth",
+                               "/cmd_vel_stamped")
+        result = base.start("rostopic", "echo", "-n", "1", "/home/result")
+        for node, topic in (("/record", "/heading"), ("/rostopic", "/home/result")):
+            graph.wait_until("a listener to " + topic, lambda: any(name.startswith(node) for name in
+                                                                   base.state()[1].get(topic, [])))
         base.run("rostopic pub -1 /home/goal view_servo/HomeToViewActionGoal '{goal: {view: recorded}}'", PATIENCE)
+        result.wait(PATIENCE)
+        recording.send_signal(signal.SIGINT)
         recording.wait(PATIENCE)
         base.run("rosservice call /homing/enable 'data: false'", PATIENCE)
 
