@@ -2,6 +2,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "check_ros/robot_listener.h"
 
+#include "view_servo/parameters/error_text.h"
 #include "view_servo/ros/arm_conversions.h"
 #include "view_servo/ros/base_conversions.h"
 #include "view_servo/ros/conversions.h"

@@ -19,6 +19,7 @@
 #include "experiments/profile_experiments.h"
 #include "experiments/rooms_experiment.h"
 #include "tools/command_line.h"
+#include "view_servo/parameters/error_text.h"
 
 #include <algorithm>
 #include <cstdint>
@@ -182,7 +183,7 @@ int main(int argc, char** argv)
   }
   catch (const std::exception& error)
   {
-    std::cerr << oneLine(error.what()) << std::endl;
+    std::cerr << oneLine(error) << std::endl;
     return 2;
   }
   if (list)
@@ -235,7 +236,7 @@ int main(int argc, char** argv)
   }
   catch (const std::exception& error)
   {
-    std::cerr << error.what() << std::endl;
+    std::cerr << oneLine(error) << std::endl;
     return 2;
   }
 }

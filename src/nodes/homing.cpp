@@ -4,6 +4,7 @@
 #include "view_servo/HomeToViewAction.h"
 #include "view_servo/LineMatches.h"
 #include "view_servo/PointMatches.h"
+#include "view_servo/parameters/error_text.h"
 #include "view_servo/ros/base_conversions.h"
 #include "view_servo/ros/base_output.h"
 #include "view_servo/ros/camera_input.h"

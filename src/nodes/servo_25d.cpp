@@ -7,6 +7,7 @@
 #include "view_servo/control/joint_guard.h"
 #include "view_servo/geometry/camera_warp.h"
 #include "view_servo/geometry/region.h"
+#include "view_servo/parameters/error_text.h"
 #include "view_servo/ros/arm_conversions.h"
 #include "view_servo/ros/conversions.h"
 #include "view_servo/ros/driver_node.h"

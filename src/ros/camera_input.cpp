@@ -3,6 +3,7 @@
 #include "view_servo/ros/camera_input.h"
 
 #include "view_servo/images/image_io.h"
+#include "view_servo/parameters/error_text.h"
 #include "view_servo/ros/node_base.h"
 #include "view_servo/ros/readiness.h"
 

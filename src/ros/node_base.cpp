@@ -2,9 +2,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "view_servo/ros/node_base.h"
 
-#include <opencv2/core.hpp>
-
-#include <algorithm>
 #include <chrono>
 #include <cstdio>
 #include <cstdlib>  // says whether this is glibc
@@ -23,25 +20,6 @@ NodeBase::NodeBase(const ros::NodeHandle& nh, const ros::NodeHandle& private_nh)
 {
   diagnostics_.setHardwareID("none");
   diagnostics_timer_ = every(1.0, "diagnostics", [this] { diagnostics_.force_update(); });
-}
-
-std::string oneLine(const std::exception& error)
-{
-  std::string text = error.what();
-  if (const auto* opencv_error = dynamic_cast<const cv::Exception*>(&error))
-  {
-    // Its text is an assertion of a source file that users do not have.
-    ROS_DEBUG_STREAM(text);
-    text = opencv_error->code == cv::Error::StsNoMem
-               ? "memory is short"
-               : "OpenCV's " + opencv_error->func + "() failed, which is a fault of this program";
-  }
-  while (!text.empty() && text.back() == '\n')
-  {
-    text.pop_back();
-  }
-  std::replace(text.begin(), text.end(), '\n', ' ');
-  return text.empty() ? "an exception without a text" : text;
 }
 
 std::string seconds(double value)

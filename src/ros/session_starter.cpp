@@ -3,6 +3,7 @@
 #include "view_servo/ros/session_starter.h"
 
 #include "view_servo/images/image_io.h"
+#include "view_servo/parameters/error_text.h"
 #include "view_servo/ros/conversions.h"
 #include "view_servo/ros/image_source.h"
 #include "view_servo/ros/node_base.h"

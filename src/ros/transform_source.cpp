@@ -2,6 +2,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "view_servo/ros/transform_source.h"
 
+#include "view_servo/parameters/error_text.h"
 #include "view_servo/ros/node_base.h"
 #include "view_servo/ros/readiness.h"
 

@@ -7,6 +7,7 @@
 #include "view_servo/SaveView.h"
 #include "view_servo/ServoStatus.h"
 #include "view_servo/SetPose.h"
+#include "view_servo/parameters/error_text.h"
 #include "view_servo/ros/call_service.h"
 #include "view_servo/ros/conversions.h"
 #include "view_servo/ros/node_base.h"

@@ -5,6 +5,7 @@
 #include "check_ros/test_drive.h"
 #include "tools/check_robot_options.h"
 #include "tools/command_line.h"
+#include "view_servo/parameters/error_text.h"
 #include "view_servo/ros/control_node.h"
 
 #include <poll.h>
@@ -233,7 +234,7 @@ int main(int argc, char** argv)
   }
   catch (const std::exception& error)
   {
-    std::cerr << "check_robot: " << oneLine(error.what()) << '\n';
+    std::cerr << "check_robot: " << oneLine(error) << '\n';
     return BAD_INPUT;
   }
 }

@@ -12,7 +12,6 @@
 #include <iostream>
 #include <limits>
 #include <optional>
-#include <sstream>
 #include <stdexcept>
 #include <string>
 #include <vector>
@@ -20,18 +19,6 @@
 namespace view_servo
 {
 /** @file Command-line programs write one line on standard error when they fail, and nothing else there. */
-
-/** Joins the lines of a message. */
-inline std::string oneLine(const std::string& text)
-{
-  std::istringstream lines(text);
-  std::string joined;
-  for (std::string line; std::getline(lines >> std::ws, line);)
-  {
-    joined += (joined.empty() ? "" : " ") + line;
-  }
-  return joined;
-}
 
 /** As long as it lives, standard error is discarded: some libraries, as those that decode images, write there. */
 class QuietStandardError

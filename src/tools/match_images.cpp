@@ -8,6 +8,7 @@
 #include "view_servo/geometry/region.h"
 #include "view_servo/images/image_io.h"
 #include "view_servo/matching/line_features.h"
+#include "view_servo/parameters/error_text.h"
 #include "view_servo/parameters/parameter.h"
 #include "view_servo/views/camera_file.h"
 #include "view_servo/views/line_view_matcher.h"
@@ -649,7 +650,7 @@ int main(int argc, char** argv)
   }
   catch (const std::exception& error)
   {
-    std::cerr << "match_images: " << oneLine(error.what()) << '\n';
+    std::cerr << "match_images: " << oneLine(error) << '\n';
   }
   return BAD_INPUT;
 }

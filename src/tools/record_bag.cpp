@@ -10,6 +10,7 @@
 #include "tools/package_folder.h"
 #include "view_servo/geometry/rotation_vector.h"
 #include "view_servo/images/image_io.h"
+#include "view_servo/parameters/error_text.h"
 #include "view_servo/ros/conversions.h"
 
 #include <sensor_msgs/image_encodings.h>
@@ -481,7 +482,7 @@ int main(int argc, char** argv)
   }
   catch (const std::exception& error)
   {
-    std::cerr << "record_bag: " << oneLine(error.what()) << '\n';
+    std::cerr << "record_bag: " << oneLine(error) << '\n';
   }
   return BAD_INPUT;
 }

@@ -3,6 +3,7 @@
 #pragma once
 
 #include "view_servo/control/goal_rules.h"
+#include "view_servo/parameters/error_text.h"
 #include "view_servo/ros/driver_context.h"
 #include "view_servo/ros/inbox.h"
 #include "view_servo/ros/timings.h"

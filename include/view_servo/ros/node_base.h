@@ -2,6 +2,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include "view_servo/parameters/error_text.h"
+
 #include <diagnostic_updater/diagnostic_updater.h>
 #include <ros/console.h>
 #include <ros/init.h>
@@ -24,9 +26,6 @@
 
 namespace view_servo
 {
-/** An exception's text for people: in one line, never empty, and without the assertions of OpenCV. */
-std::string oneLine(const std::exception& error);
-
 /** A time [s] as a text for people. */
 std::string seconds(double value);
 

@@ -5,6 +5,7 @@
 #include "view_servo/ImageSource.h"
 #include "view_servo/SetView.h"
 #include "view_servo/geometry/camera.h"
+#include "view_servo/parameters/error_text.h"
 #include "view_servo/ros/camera_input.h"
 #include "view_servo/ros/conversions.h"
 #include "view_servo/ros/image_source.h"
