@@ -432,6 +432,28 @@ std::optional<Eigen::Matrix3d> fundamentalOf(const Correspondences& points, cons
   return stands(f) ? f : std::nullopt;
 }
 
+/** Adds where neighbouring lines meet, best first; true when they, or the planes, determine a fundamental matrix. */
+bool addPoints(Attempt& attempt, const SegmentPairs& lines, const LinePlanes& planes, const LineMatcherParams& params,
+               ViewMatch& result)
+{
+  result.matches = attempt.junctions();
+  std::stable_sort(result.matches.begin(), result.matches.end(),
+                   [](const MatchedPoint& a, const MatchedPoint& b) { return a.score > b.score; });
+  const std::optional<Eigen::Matrix3d> f =
+      fundamentalOf(positions(result.matches), lines, planes, params, attempt.rng());
+  if (f)
+  {
+    result.fundamental = *f;
+  }
+  const double threshold = params.ransac.inlier_threshold;
+  for (MatchedPoint& point : result.matches)
+  {
+    point.inlier =
+        f ? sampsonError(*f, point.position) <= threshold * threshold : liesOnPlane(planes, point.position, threshold);
+  }
+  return f.has_value();
+}
+
 constexpr std::size_t MIN_SEGMENTS = 6;
 
 /** Where the lines of neighbouring segments meet; some places lie beyond the border of the image. */
@@ -594,8 +616,6 @@ ViewMatch LineViewMatcher::match(const LineFeatures& reference, const LineFeatur
 {
   ViewMatch result;
   result.model = model;
-  result.matrix.setConstant(NOT_A_NUMBER);
-  result.rms_error = NOT_A_NUMBER;
   StageClock clock(result.stages);
 
   Attempt attempt(reference, current, params_);
@@ -616,8 +636,8 @@ ViewMatch LineViewMatcher::match(const LineFeatures& reference, const LineFeatur
   result.log_significance = attempt.significance();
   clock.finish("significance");
 
-  SegmentPairs lines;
   const std::vector<SegmentMatch> matches = attempt.matches();
+  SegmentPairs lines;
   for (const SegmentMatch& match : matches)
   {
     lines.push_back({ reference.segment(match.reference), current.segment(match.current) });
@@ -633,22 +653,7 @@ ViewMatch LineViewMatcher::match(const LineFeatures& reference, const LineFeatur
     result.planes.push_back(normalizedHomography(h));
   }
   clock.finish("planes");
-
-  result.matches = attempt.junctions();
-  std::stable_sort(result.matches.begin(), result.matches.end(),
-                   [](const MatchedPoint& a, const MatchedPoint& b) { return a.score > b.score; });
-  const Correspondences points = positions(result.matches);
-  const double threshold = params_.ransac.inlier_threshold;
-  const std::optional<Eigen::Matrix3d> f = fundamentalOf(points, lines, planes, params_, attempt.rng());
-  if (f)
-  {
-    result.fundamental = *f;
-  }
-  for (MatchedPoint& point : result.matches)
-  {
-    point.inlier =
-        f ? sampsonError(*f, point.position) <= threshold * threshold : liesOnPlane(planes, point.position, threshold);
-  }
+  const bool f = addPoints(attempt, lines, planes, params_, result);
   clock.finish("fundamental");
 
   const bool by_chance = result.log_significance < params_.min_log_significance;

@@ -18,7 +18,6 @@
 #include <cmath>
 #include <functional>
 #include <iterator>
-#include <limits>
 #include <memory>
 #include <numeric>
 #include <optional>
@@ -29,9 +28,17 @@ namespace view_servo
 {
 namespace
 {
-constexpr double NOT_A_NUMBER = std::numeric_limits<double>::quiet_NaN();
 constexpr std::size_t MIN_CORNERS = 8;
 constexpr int MAX_GUIDED_ROUNDS = 6;
+
+/** Why a geometry that chance does not explain is not believed. */
+enum class Refusal
+{
+  NONE,
+  LEFT_OPEN,  ///< by the matches, which do not determine it
+  REPEATED,   ///< other places agree with it nearly as well
+  MIRRORED    ///< the mirrored image agrees with one better
+};
 
 /** Which levels of reference and current image are compared. */
 struct LevelPair
@@ -209,31 +216,114 @@ public:
     return from_.corners.size() >= MIN_CORNERS && to_.corners.size() >= MIN_CORNERS;
   }
 
-  /** Associates, chooses candidates and fits; true when the geometry is one that chance does not explain. */
+  /** Associates, chooses candidates, fits, finds more matches and checks; true when there is a geometry to be believed. */
   bool run(ViewMatch& result, StageClock& clock, Rng& rng)
+  {
+    associate(clock, rng);
+    if (!fit(result, clock, rng))
+    {
+      inliers_.clear();
+      return false;
+    }
+    if (params_.guided)
+    {
+      guide(rng);
+      clock.finish("guided");
+    }
+    if (params_.unique)
+    {
+      refusal_ = isRepeated(rng) ? Refusal::REPEATED : Refusal::NONE;
+      clock.finish("unique");
+    }
+    const bool maybe_mirrored = result.log_significance < BEYOND_MIRRORS || agreeingPart() < MOST_CANDIDATES;
+    if (refusal_ == Refusal::NONE && params_.refuse_mirrored && maybe_mirrored)
+    {
+      const bool mirrored = isMirrored(reference_, levels_.reference, current_, levels_.current, rng);
+      refusal_ = mirrored ? Refusal::MIRRORED : Refusal::NONE;
+      clock.finish("mirror");
+    }
+    return refusal_ == Refusal::NONE;
+  }
+
+  /** Why `run` refused a geometry, NONE when there was none. */
+  Refusal refusal() const
+  {
+    return refusal_;
+  }
+
+  /** Writes what was found in the pixels of the full images: inliers, and the candidates of all other corners. */
+  void report(bool accepted, ViewMatch& result) const
+  {
+    const Eigen::Matrix3d reference_map = reference_.toFull(levels_.reference);
+    const Eigen::Matrix3d current_map = current_.toFull(levels_.current);
+    const auto add = [&](const CornerMatch& match, bool inlier) {
+      const Correspondence pair = level_.correspondence(match);
+      result.matches.push_back({ { (reference_map * pair.reference.homogeneous()).hnormalized(),
+                                   (current_map * pair.current.homogeneous()).hnormalized() },
+                                 match.score,
+                                 inlier });
+    };
+    result.matches.clear();
+    std::vector<char> used(from_.corners.size(), 0);
+    for (const CornerMatch& match : inliers_)
+    {
+      used[static_cast<std::size_t>(match.row)] = 1;
+      add(match, accepted);
+    }
+    for (const CornerMatch& candidate : candidates_)
+    {
+      if (used[static_cast<std::size_t>(candidate.row)] == 0)
+      {
+        add(candidate, false);
+      }
+    }
+    std::stable_sort(result.matches.begin(), result.matches.end(),
+                     [](const MatchedPoint& a, const MatchedPoint& b) { return a.score > b.score; });
+    if (!accepted)
+    {
+      return;
+    }
+    double squares = 0.0;
+    for (const CornerMatch& match : inliers_)
+    {
+      squares += geometry_.squaredError(matrix_, level_.correspondence(match));
+    }
+    result.outcome = MatchOutcome::MATCHED;
+    result.inliers = static_cast<int>(inliers_.size());
+    result.rms_error = std::sqrt(squares / static_cast<double>(inliers_.size()));
+    result.matrix = geometry_.ofFullImages(matrix_, reference_map, current_map);
+    result.reference_level = levels_.reference;
+    result.current_level = levels_.current;
+  }
+
+private:
+  void associate(StageClock& clock, Rng& rng)
   {
     association_ = associatePoints(from_, reference_.profileIndex(levels_.reference), to_, params_.points);
     clock.finish("association");
-    std::vector<Association> candidates = candidateMatches(association_, params_.points.assignment);
-    Correspondences pairs;
-    for (const Association& candidate : candidates)
+    associations_ = candidateMatches(association_, params_.points.assignment);
+    for (const Association& candidate : associations_)
     {
       candidates_.push_back(level_.toMatch(candidate));
-      pairs.push_back(level_.correspondence(candidates_.back()));
+      pairs_.push_back(level_.correspondence(candidates_.back()));
     }
     clock.finish("assignment");
     if (params_.view_consistency == ViewConsistency::BEFORE)
     {
-      const std::vector<int> kept = viewConsistentCandidates(pairs, params_.consistency, rng);
-      candidates = chosen(candidates, kept);
+      const std::vector<int> kept = viewConsistentCandidates(pairs_, params_.consistency, rng);
+      associations_ = chosen(associations_, kept);
       candidates_ = chosen(candidates_, kept);
-      pairs = select(pairs, kept);
+      pairs_ = select(pairs_, kept);
       clock.finish("view_consistency");
     }
+  }
 
+  /** True when the candidates determine a geometry that chance does not explain, and that is not one of many. */
+  bool fit(ViewMatch& result, StageClock& clock, Rng& rng)
+  {
     const bool one_hypothesis = params_.estimator == GeometryEstimator::RANSAC;
     const std::optional<PairFit> fit = one_hypothesis
-                                           ? geometry_.fitCandidates(candidates, pairs, result.ransac, rng)
+                                           ? geometry_.fitCandidates(associations_, pairs_, result.ransac, rng)
                                            : geometry_.fitAssociation(association_, positions(from_.corners),
                                                                       positions(to_.corners), result.ransac, rng);
     clock.finish("ransac");
@@ -248,34 +338,23 @@ public:
       inliers_.push_back(level_.toMatch(match));
       supporting.push_back(level_.correspondence(inliers_.back()));
     }
-    const double among = chanceAmong(supporting.size(), [&](std::size_t reference, std::size_t current) {
-      return geometry_.agrees(fit->matrix, { supporting[reference].reference, supporting[current].current });
-    });
-    const double chance = std::max(geometry_.chance(current_.image(levels_.current).size()), among);
-    // Also of several hypotheses the one-to-one candidates judge: they were chosen without regard to the geometry.
-    const auto agreeing = std::count_if(
-        pairs.begin(), pairs.end(), [&](const Correspondence& pair) { return geometry_.agrees(fit->matrix, pair); });
-    result.log_significance =
-        logSignificance(pairs.size(), static_cast<std::size_t>(agreeing), geometry_.sampleSize(), chance);
+    matrix_ = fit->matrix;
+    result.log_significance = significance(supporting);
     if (result.log_significance < min_significance_ || !keepsOrientation(supporting))
     {
-      inliers_.clear();
       return false;
     }
     constexpr double CLEARLY = 1.75;  // walls of windows or tiles have had up to 1.65, rooms 1.9 and more
-    rivalled_ = params_.unique &&
-                static_cast<double>(agreeing) < CLEARLY * partOfRivals(fit->matrix) * static_cast<double>(pairs.size());
-    if (rivalled_)
+    if (params_.unique && agreeingPart() < CLEARLY * partOfRivals())
     {
-      inliers_.clear();
+      refusal_ = Refusal::REPEATED;
       return false;
     }
-    const Eigen::Matrix3d refined = geometry_.refine(fit->matrix, supporting);
-    const std::optional<Eigen::Matrix3d> settled = geometry_.settle(refined, pairs, rng);
-    left_open_ = !settled;
-    if (left_open_)
+    const Eigen::Matrix3d refined = geometry_.refine(matrix_, supporting);
+    const std::optional<Eigen::Matrix3d> settled = geometry_.settle(refined, pairs_, rng);
+    if (!settled)
     {
-      inliers_.clear();
+      refusal_ = Refusal::LEFT_OPEN;
       return false;
     }
     matrix_ = *settled;
@@ -283,28 +362,30 @@ public:
     {
       keepAgreeing(candidates_);
     }
-    pairs_ = std::move(pairs);
     return true;
   }
 
-  /** The part of the candidates that agrees with the geometry. */
+  /** -log10 of the expected number of geometries among chance matches that as many candidates agree with. */
+  double significance(const Correspondences& supporting) const
+  {
+    const double among = chanceAmong(supporting.size(), [&](std::size_t reference, std::size_t current) {
+      return geometry_.agrees(matrix_, { supporting[reference].reference, supporting[current].current });
+    });
+    const double chance = std::max(geometry_.chance(current_.image(levels_.current).size()), among);
+    // Also of several hypotheses the one-to-one candidates judge: they were chosen without regard to the geometry.
+    return logSignificance(pairs_.size(), countAgreeing(), geometry_.sampleSize(), chance);
+  }
+
+  /** How many candidates agree with the geometry. */
+  std::size_t countAgreeing() const
+  {
+    return static_cast<std::size_t>(std::count_if(
+        pairs_.begin(), pairs_.end(), [&](const Correspondence& pair) { return geometry_.agrees(matrix_, pair); }));
+  }
+
   double agreeingPart() const
   {
-    const auto agreeing = std::count_if(pairs_.begin(), pairs_.end(),
-                                        [&](const Correspondence& pair) { return geometry_.agrees(matrix_, pair); });
-    return static_cast<double>(agreeing) / static_cast<double>(pairs_.size());
-  }
-
-  /** Whether there was a geometry, and other places that look like the candidates' agree with it nearly as often. */
-  bool rivalled() const
-  {
-    return rivalled_;
-  }
-
-  /** Whether there was a geometry, and the candidates do not determine it. */
-  bool leftOpen() const
-  {
-    return left_open_;
+    return static_cast<double>(countAgreeing()) / static_cast<double>(pairs_.size());
   }
 
   /** More matches along the geometry that was found, and a better geometry from them. */
@@ -362,58 +443,12 @@ public:
         .has_value();
   }
 
-  /** Writes what was found in the pixels of the full images: inliers, and the candidates of all other corners. */
-  void report(bool accepted, ViewMatch& result) const
-  {
-    const Eigen::Matrix3d reference_map = reference_.toFull(levels_.reference);
-    const Eigen::Matrix3d current_map = current_.toFull(levels_.current);
-    const auto add = [&](const CornerMatch& match, bool inlier) {
-      const Correspondence pair = level_.correspondence(match);
-      result.matches.push_back({ { (reference_map * pair.reference.homogeneous()).hnormalized(),
-                                   (current_map * pair.current.homogeneous()).hnormalized() },
-                                 match.score,
-                                 inlier });
-    };
-    result.matches.clear();
-    std::vector<char> used(from_.corners.size(), 0);
-    for (const CornerMatch& match : inliers_)
-    {
-      used[static_cast<std::size_t>(match.row)] = 1;
-      add(match, accepted);
-    }
-    for (const CornerMatch& candidate : candidates_)
-    {
-      if (used[static_cast<std::size_t>(candidate.row)] == 0)
-      {
-        add(candidate, false);
-      }
-    }
-    std::stable_sort(result.matches.begin(), result.matches.end(),
-                     [](const MatchedPoint& a, const MatchedPoint& b) { return a.score > b.score; });
-    if (!accepted)
-    {
-      return;
-    }
-    double squares = 0.0;
-    for (const CornerMatch& match : inliers_)
-    {
-      squares += geometry_.squaredError(matrix_, level_.correspondence(match));
-    }
-    result.outcome = MatchOutcome::MATCHED;
-    result.inliers = static_cast<int>(inliers_.size());
-    result.rms_error = std::sqrt(squares / static_cast<double>(inliers_.size()));
-    result.matrix = geometry_.ofFullImages(matrix_, reference_map, current_map);
-    result.reference_level = levels_.reference;
-    result.current_level = levels_.current;
-  }
-
-private:
   /**
-   * Of the reference corners whose candidates agree with a matrix: the part that agrees, too, of the other places that look
+   * Of the reference corners whose candidates agree with the geometry: the part that agrees, too, of the other places that look
    * nearly as much like them. On tiles or windows in rows these are places a number of periods off; and where an epipolar
    * line runs along a row, it passes many of them, whether it is right or not.
    */
-  double partOfRivals(const Eigen::Matrix3d& matrix) const
+  double partOfRivals() const
   {
     constexpr double ALIKE = 0.5;   // of the candidate's weight
     constexpr double APART = 15.0;  // [px]: corners that are nearer are of the same thing
@@ -421,7 +456,7 @@ private:
     std::vector<const CornerMatch*> of_row(from_.corners.size(), nullptr);
     for (const CornerMatch& candidate : candidates_)
     {
-      if (geometry_.agrees(matrix, level_.correspondence(candidate)))
+      if (geometry_.agrees(matrix_, level_.correspondence(candidate)))
       {
         of_row[static_cast<std::size_t>(candidate.row)] = &candidate;
       }
@@ -436,7 +471,7 @@ private:
           (rival.current - candidate->current).norm() > APART)
       {
         rivals += 1;
-        agreeing += geometry_.agrees(matrix, level_.correspondence(rival)) ? 1 : 0;
+        agreeing += geometry_.agrees(matrix_, level_.correspondence(rival)) ? 1 : 0;
       }
     }
     return rivals >= ENOUGH ? static_cast<double>(agreeing) / rivals : 0.0;
@@ -459,14 +494,39 @@ private:
   const PointFeatures& from_;
   const PointFeatures& to_;
   AssociationMatrix association_;
-  std::vector<CornerMatch> candidates_;
+  std::vector<Association> associations_;  ///< one to one
+  std::vector<CornerMatch> candidates_;    ///< the same with their positions
+  Correspondences pairs_;                  ///< the same again
   const LevelData level_;
   std::vector<CornerMatch> inliers_;
-  Correspondences pairs_;  ///< candidates_ of a geometry that was accepted
   Eigen::Matrix3d matrix_;
-  bool left_open_ = false;
-  bool rivalled_ = false;
+  Refusal refusal_ = Refusal::NONE;
 };
+
+std::string whyNot(Refusal refusal, const PreparedImage& reference, const PreparedImage& current,
+                   const ViewMatch& result)
+{
+  switch (refusal)
+  {
+    case Refusal::REPEATED:
+      return REPEATED;
+    case Refusal::MIRRORED:
+      return MIRRORED;
+    case Refusal::LEFT_OPEN:
+      return "no geometry found: what matches lies on one plane, which leaves the fundamental matrix open; look for "
+             "a homography";
+    case Refusal::NONE:
+      break;
+  }
+  if (result.outcome == MatchOutcome::TOO_FEW_FEATURES)
+  {
+    return "too few corners: " + std::to_string(reference.points(0).corners.size()) + " in the reference, " +
+           std::to_string(current.points(0).corners.size()) + " in the current image, " + std::to_string(MIN_CORNERS) +
+           " needed in each" + noteOfLight(reference, current);
+  }
+  return "no geometry found: the " + std::to_string(result.matches.size()) +
+         " candidate matches do not support one better than chance would" + noteOfLight(reference, current);
+}
 
 }  // namespace
 
@@ -544,14 +604,10 @@ ViewMatch PointViewMatcher::match(const PreparedImage& reference, const Prepared
 
   ViewMatch result;
   result.model = model;
-  result.matrix.setConstant(NOT_A_NUMBER);
-  result.rms_error = NOT_A_NUMBER;
   StageClock clock(result.stages);
   bool any_features = false;
   bool ended_early = false;
-  bool left_open = false;
-  bool repeated = false;
-  bool mirrored = false;
+  Refusal refusal = Refusal::NONE;
   TrialQueue trials(reference, current, params_);
   while (!(ended_early = given_up && given_up()))
   {
@@ -570,33 +626,15 @@ ViewMatch PointViewMatcher::match(const PreparedImage& reference, const Prepared
       continue;
     }
     any_features = true;
-    bool accepted = attempt.run(result, clock, rng);
-    repeated = attempt.rivalled();
-    if (accepted && params_.guided)
-    {
-      attempt.guide(rng);
-      clock.finish("guided");
-    }
-    if (accepted && params_.unique)
-    {
-      repeated = attempt.isRepeated(rng);
-      accepted = !repeated;
-      clock.finish("unique");
-    }
-    if (accepted && params_.refuse_mirrored &&
-        (result.log_significance < BEYOND_MIRRORS || attempt.agreeingPart() < MOST_CANDIDATES))
-    {
-      mirrored = isMirrored(reference, trial->levels.reference, current, trial->levels.current, rng);
-      accepted = !mirrored;
-      clock.finish("mirror");
-    }
+    const bool accepted = attempt.run(result, clock, rng);
     if (accepted || (trial->levels.reference == 0 && trial->levels.current == 0))
     {
       // Without a geometry, the candidates of the full images are reported.
       attempt.report(accepted, result);
     }
-    left_open = attempt.leftOpen();
-    if (accepted || repeated || mirrored || (left_open && trial->share == params_.points.search.share))
+    refusal = attempt.refusal();
+    const bool may_change = refusal == Refusal::LEFT_OPEN && trial->share != params_.points.search.share;
+    if (accepted || (refusal != Refusal::NONE && !may_change))
     {
       break;  // what repeats itself at this scale, or lies on one plane, does at others
     }
@@ -607,35 +645,10 @@ ViewMatch PointViewMatcher::match(const PreparedImage& reference, const Prepared
     result.message = std::to_string(result.inliers) + " of " + std::to_string(result.matches.size()) +
                      " matches agree with one " + geometry->name();
   }
-  else if (ended_early)
-  {
-    result.message = "given up";
-  }
-  else if (repeated)
-  {
-    result.message = REPEATED;
-  }
-  else if (mirrored)
-  {
-    result.message = MIRRORED;
-  }
-  else if (left_open)
-  {
-    result.message =
-        "no geometry found: what matches lies on one plane, which leaves the fundamental matrix open; look for "
-        "a homography";
-  }
-  else if (!any_features)
-  {
-    result.outcome = MatchOutcome::TOO_FEW_FEATURES;
-    result.message = "too few corners: " + std::to_string(reference.points(0).corners.size()) + " in the reference, " +
-                     std::to_string(current.points(0).corners.size()) + " in the current image, " +
-                     std::to_string(MIN_CORNERS) + " needed in each" + noteOfLight(reference, current);
-  }
   else
   {
-    result.message = "no geometry found: the " + std::to_string(result.matches.size()) +
-                     " candidate matches do not support one better than chance would" + noteOfLight(reference, current);
+    result.outcome = any_features || ended_early ? MatchOutcome::NO_GEOMETRY : MatchOutcome::TOO_FEW_FEATURES;
+    result.message = ended_early ? "given up" : whyNot(refusal, reference, current, result);
   }
   result.elapsed_ms = clock.total();
   return result;

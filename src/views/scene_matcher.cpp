@@ -22,7 +22,6 @@
 #include <cmath>
 #include <cstddef>
 #include <iterator>
-#include <limits>
 #include <optional>
 #include <utility>
 
@@ -30,7 +29,6 @@ namespace view_servo
 {
 namespace
 {
-constexpr double NOT_A_NUMBER = std::numeric_limits<double>::quiet_NaN();
 constexpr double HUBER_WIDTH = 0.5;  // of the last fit: residuals beyond count linearly [px]
 constexpr std::size_t MIN_MATCHES = 15;
 // Significance of a plane: wrong ones of pairs that show nothing in common had 6.7 at most.
@@ -497,6 +495,19 @@ private:
   double margin_ = 0.0;        ///< of matrix_: how far it is above what is asked for; negative: not enough
 };
 
+/** @param asked the model that was asked for. */
+std::string whatIsFound(const ViewMatch& result, GeometryModel asked)
+{
+  const std::string count = std::to_string(result.inliers) + " of " + std::to_string(result.matches.size()) + " points";
+  if (result.model == GeometryModel::HOMOGRAPHY)
+  {
+    return count + " lie on one plane" +
+           (asked == GeometryModel::FUNDAMENTAL ? ", and too little beside it: a homography" : "");
+  }
+  return count + ", " + std::to_string(result.lines.size()) + " lines and " + std::to_string(result.planes.size()) +
+         " planes agree with one fundamental matrix";
+}
+
 }  // namespace
 
 SceneMatcherParams::SceneMatcherParams()
@@ -549,8 +560,6 @@ ViewMatch SceneMatcher::match(const PreparedImage& reference, const PreparedImag
 {
   ViewMatch result;
   result.model = model;
-  result.matrix.setConstant(NOT_A_NUMBER);
-  result.rms_error = NOT_A_NUMBER;
   StageClock clock(result.stages);
 
   LineMatcherParams line_params = params_.lines;
@@ -610,20 +619,13 @@ ViewMatch SceneMatcher::match(const PreparedImage& reference, const PreparedImag
     attempt.reportPlane(*plane, lines.lines, result);
   }
   attempt.reportCandidates(result);
-  const std::string count = std::to_string(result.inliers) + " of " + std::to_string(result.matches.size());
-  if (refused)
+  if (result.outcome == MatchOutcome::MATCHED)
+  {
+    result.message = whatIsFound(result, model);
+  }
+  else if (refused)
   {
     result.message = repeated ? REPEATED : MIRRORED;
-  }
-  else if (found)
-  {
-    result.message = count + " points, " + std::to_string(result.lines.size()) + " lines and " +
-                     std::to_string(result.planes.size()) + " planes agree with one fundamental matrix";
-  }
-  else if (plane)
-  {
-    result.message = count + " points lie on one plane" +
-                     (model == GeometryModel::FUNDAMENTAL ? ", and too little beside it: a homography" : "");
   }
   else if (points.outcome == MatchOutcome::TOO_FEW_FEATURES && lines.outcome == MatchOutcome::TOO_FEW_FEATURES)
   {

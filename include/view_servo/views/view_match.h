@@ -63,11 +63,13 @@ struct ViewMatch
   MatchOutcome outcome = MatchOutcome::NO_GEOMETRY;
   std::string message;  ///< one line, for people
   GeometryModel model = GeometryModel::HOMOGRAPHY;
-  Eigen::Matrix3d matrix;             ///< NaN unless MATCHED; H with H(2,2) = 1 where possible, F with norm 1
+  /** NaN unless MATCHED; H with H(2,2) = 1 where possible, F with norm 1. */
+  Eigen::Matrix3d matrix = Eigen::Matrix3d::Constant(std::numeric_limits<double>::quiet_NaN());
   std::vector<MatchedPoint> matches;  ///< all candidates, best first
   int inliers = 0;                    ///< data that agree with `matrix`: points; for LineViewMatcher's H, lines
-  double rms_error = 0.0;   ///< of the inliers: transfer error in one image (H) or Sampson distance (F) [px]; NaN: none
-  RansacStatistics ransac;  ///< of the attempt that succeeded, else of the last
+  /** Of the inliers: transfer error in one image (H) or Sampson distance (F) [px]; NaN: none. */
+  double rms_error = std::numeric_limits<double>::quiet_NaN();
+  RansacStatistics ransac;        ///< of the attempt that succeeded, else of the last
   std::vector<StageTime> stages;  ///< in the order of their ends
   double elapsed_ms = 0.0;        ///< of the whole match [ms]
 
