@@ -330,7 +330,8 @@ TEST_P(ShippedRunTest, EachImageIsAnsweredTrulyOrRefused)
     {
       if (answer.header.stamp == frame.stamp)
       {
-        const bool supported = expectPossible(answer.points, truth, 3.0);  // intersections are less certain than corners
+        const bool supported =
+            expectPossible(answer.points, truth, 3.0);  // intersections are less certain than corners
         EXPECT_TRUE(supported || !answer.reason.empty());
       }
     }
