@@ -17,6 +17,7 @@ import xmlrpc.client
 import rospy
 
 CALLER = "/documents"
+SLOWDOWN = float(os.environ.get("VIEW_SERVO_SLOWDOWN", "1"))  # of what is built with sanitizers
 
 # A test that is ended from outside must not leave nodes behind. unittest goes on after SystemExit, not after this.
 signal.signal(signal.SIGTERM, signal.default_int_handler)
@@ -34,7 +35,7 @@ def free_port():
         return listener.getsockname()[1]
 
 
-def wait_until(what, holds, deadline=60.0):
+def wait_until(what, holds, deadline=60.0 * SLOWDOWN):
     """Waits until `holds()` is true, and returns that. Raises what is missing."""
     end = time.monotonic() + deadline
     while True:

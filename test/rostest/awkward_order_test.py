@@ -29,7 +29,7 @@ from view_servo.srv import SaveView, SaveViewRequest  # noqa: E402
 
 PAUSE = 0.3        # between one node and the next [s]
 CAMERA_LATE = 5.0  # after the first node [s]
-PATIENCE = 60.0    # [s]
+PATIENCE = 60.0 * graph.SLOWDOWN  # [s]
 
 
 class Camera:

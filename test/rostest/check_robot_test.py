@@ -27,7 +27,7 @@ import rospy  # noqa: E402
 import sensor_msgs.msg  # noqa: E402
 
 SECONDS = "3"      # that check_robot listens
-PATIENCE = 120.0   # for one run [s]
+PATIENCE = 120.0 * graph.SLOWDOWN  # for one run [s]
 PUBLISH_ODOMETRY = "--publish-odometry"  # an argument of this file
 # How busy the machine is does not depend on the robot: these lines may be warnings in any run.
 OF_THE_MACHINE = {"processor", "views' disk"}

@@ -19,7 +19,7 @@ import graph  # noqa: E402
 
 from view_servo.msg import ServoStatus  # noqa: E402
 
-PATIENCE = 180.0  # [s]
+PATIENCE = 180.0 * graph.SLOWDOWN  # [s]
 STOPPED = 2.0  # how long [s]
 
 

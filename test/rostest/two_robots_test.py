@@ -13,7 +13,7 @@ ROOT = os.path.realpath(os.path.join(os.path.dirname(os.path.abspath(__file__)),
 sys.path.insert(0, os.path.join(ROOT, "test", "docs"))
 import graph  # noqa: E402
 
-PATIENCE = 180.0  # [s]
+PATIENCE = 180.0 * graph.SLOWDOWN  # [s]
 
 
 class TwoRobots(unittest.TestCase):
