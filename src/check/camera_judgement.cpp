@@ -119,7 +119,7 @@ Finding judgeStamps(const CameraObservations& camera)
   constexpr double OLD = 0.25;     // [s]
   constexpr double FUTURE = 0.02;  // more than clocks that are synchronised differ [s]
   const std::string name = "image stamps";
-  const Stream& images = camera.images;
+  const StreamObservations& images = camera.images;
   if (!images.stamp_fault.empty())
   {
     return error(name, images.stamp_fault, "let the camera's driver stamp each image with the time of its exposure");
@@ -144,7 +144,7 @@ Finding judgeStamps(const CameraObservations& camera)
 
 }  // namespace
 
-std::string silence(const Stream& stream, const std::string& what)
+std::string silence(const StreamObservations& stream, const std::string& what)
 {
   const std::string none = "no " + what + " has come on '" + stream.topic + "'";
   return none + (stream.publisher.empty() ? ": nobody publishes it" : ", though " + stream.publisher + " publishes it");

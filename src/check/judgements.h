@@ -17,7 +17,7 @@ Findings judgeCamera(const CameraObservations& camera);
 /** "camera frame" and "tf", and for a base "camera mount". @param is_arm whether the camera is in an arm's hand. */
 Findings judgeMount(const MountObservations& mount, bool is_arm);
 
-/** "odometry", "odometry frames", "odometry stamps", "clocks" and "odometry at rest". @param image_age as Stream::age [s]. */
+/** "odometry", "odometry frames", "odometry stamps", "clocks" and "odometry at rest". @param image_age as StreamObservations::age [s]. */
 Findings judgeOdometry(const OdometryObservations& odometry, double image_age);
 
 /** "commands". */
@@ -30,6 +30,6 @@ Findings judgeJoints(const JointObservations& joints);
 Findings judgeMachine(const MachineObservations& machine);
 
 /** A topic on which nothing came, in words: whether nobody publishes it, or somebody does and is silent. */
-std::string silence(const Stream& stream, const std::string& what);
+std::string silence(const StreamObservations& stream, const std::string& what);
 
 }  // namespace view_servo::check

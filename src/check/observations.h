@@ -23,7 +23,7 @@ constexpr double UNKNOWN = std::numeric_limits<double>::quiet_NaN();
 constexpr double INPUT_TIMEOUT = 0.25;  ///< a base stands when an input pauses for longer: the nodes' default [s]
 
 /** Messages on one topic. */
-struct Stream
+struct StreamObservations
 {
   std::string topic;
   std::string publisher;       ///< a node that publishes it, by the master; empty: there is none
@@ -37,8 +37,8 @@ struct Stream
 
 struct CameraObservations
 {
-  Stream images;
-  Stream infos;
+  StreamObservations images;
+  StreamObservations infos;
   int pairs = 0;  ///< images that a camera_info with the same stamp came with
   int width = 0;  ///< of the images [px]
   int height = 0;
@@ -68,7 +68,7 @@ struct MountObservations
 
 struct OdometryObservations
 {
-  Stream stream;
+  StreamObservations stream;
   std::string frame;        ///< header.frame_id
   std::string child_frame;  ///< child_frame_id
   std::string fault;
@@ -91,7 +91,7 @@ struct CommandObservations
 
 struct JointObservations
 {
-  Stream stream;
+  StreamObservations stream;
   bool described = false;            ///< there is a robot_description with joints that move
   std::vector<std::string> unknown;  ///< joints of the messages that the URDF does not have
   std::vector<std::string> silent;   ///< joints of the URDF that no message has

@@ -21,7 +21,7 @@ std::string join(const std::vector<std::string>& names)
   return text + (names.size() > MOST ? " and " + std::to_string(names.size() - MOST) + " more" : "");
 }
 
-Finding judgeOdometryRate(const Stream& stream)
+Finding judgeOdometryRate(const StreamObservations& stream)
 {
   constexpr double SLOW = 10.0;  // [Hz]
   const std::string name = "odometry";
@@ -44,7 +44,7 @@ Finding judgeOdometryRate(const Stream& stream)
   return ok(name, found);
 }
 
-Finding judgeOdometryStamps(const Stream& stream)
+Finding judgeOdometryStamps(const StreamObservations& stream)
 {
   constexpr double OFTEN_LATE = 0.05;  // part of the messages
   const std::string name = "odometry stamps";
@@ -162,7 +162,7 @@ Findings judgeCommands(const CommandObservations& commands)
 Findings judgeJoints(const JointObservations& joints)
 {
   const std::string name = "joint states";
-  const Stream& stream = joints.stream;
+  const StreamObservations& stream = joints.stream;
   if (stream.count == 0)
   {
     return { warning(name, silence(stream, "joint state"),

@@ -51,7 +51,7 @@ void StreamMeter::add(double time, double age, bool late)
   late_ += late ? 1 : 0;
 }
 
-void StreamMeter::fill(Stream& stream) const
+void StreamMeter::fill(StreamObservations& stream) const
 {
   stream.count = count();
   if (times_.empty())

@@ -16,7 +16,7 @@ public:
   void add(double time, double age, bool late);
 
   /** Fills in count, rate, gap, age and share of late messages. */
-  void fill(Stream& stream) const;
+  void fill(StreamObservations& stream) const;
 
   int count() const
   {

@@ -220,6 +220,7 @@ int main(int argc, char** argv)
     }
     std::vector<std::string> words = options->for_ros;
     std::vector<char*> pointers;
+    pointers.reserve(words.size());
     for (std::string& word : words)
     {
       pointers.push_back(&word[0]);

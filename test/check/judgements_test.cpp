@@ -26,9 +26,9 @@ struct Everything
   MachineObservations machine;
 };
 
-Stream stream(const std::string& topic, double rate)
+StreamObservations stream(const std::string& topic, double rate)
 {
-  Stream result;
+  StreamObservations result;
   result.topic = topic;
   result.publisher = "/driver";
   result.count = 100;

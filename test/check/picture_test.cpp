@@ -76,7 +76,7 @@ TEST(CheckPicture, DrawsCornersAndSegments)
 TEST(CheckStreams, MeasuresRateGapAgeAndOrder)
 {
   StreamMeter meter;
-  Stream stream;
+  StreamObservations stream;
   meter.fill(stream);
   EXPECT_EQ(stream.count, 0);
   for (int i = 0; i <= 40; ++i)
