@@ -9,31 +9,83 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 namespace view_servo
 {
+namespace
+{
+/** Sums over pairs of intensities. */
+class PairedIntensities
+{
+public:
+  void add(float a, float b)
+  {
+    a -= MIDDLE;
+    b -= MIDDLE;
+    sum_a_ += a;
+    sum_b_ += b;
+    sum_aa_ += a * a;
+    sum_bb_ += b * b;
+    sum_ab_ += a * b;
+    ++count_;
+  }
+
+  int count() const
+  {
+    return count_;
+  }
+
+  double correlation() const
+  {
+    constexpr float NOISE = 4.0F;  // variance of intensities that means nothing
+    const float n = static_cast<float>(count_);
+    const float variance_a = sum_aa_ / n - sum_a_ / n * (sum_a_ / n);
+    const float variance_b = sum_bb_ / n - sum_b_ / n * (sum_b_ / n);
+    const float covariance = sum_ab_ / n - sum_a_ / n * (sum_b_ / n);
+    return covariance / std::sqrt((variance_a + NOISE) * (variance_b + NOISE));
+  }
+
+private:
+  static constexpr float MIDDLE = 128.0F;  // keeps sums small
+
+  float sum_a_ = 0.0F;
+  float sum_b_ = 0.0F;
+  float sum_aa_ = 0.0F;
+  float sum_bb_ = 0.0F;
+  float sum_ab_ = 0.0F;
+  int count_ = 0;
+};
+
+/**
+ * The part of a segment that another one shows, too: first and last, as fractions of `mapped`, the segment as the other
+ * image shows it. What a homography does to fractions is neglected.
+ */
+std::pair<double, double> partInCommon(const Segment& mapped, const Segment& other)
+{
+  const Eigen::Vector2d direction = other.direction();
+  const double start = (mapped.start - other.start).dot(direction);
+  const double end = (mapped.end - other.start).dot(direction);
+  const double length = other.length();
+  return { std::clamp((std::clamp(start, 0.0, length) - start) / (end - start), 0.0, 1.0),
+           std::clamp((std::clamp(end, 0.0, length) - start) / (end - start), 0.0, 1.0) };
+}
+}  // namespace
+
 double sideCorrelation(const cv::Mat& reference, const cv::Mat& current, const Eigen::Matrix3d& h,
                        const Segment& reference_segment, const Segment& current_segment)
 {
   constexpr int ALONG = 16;
   constexpr int ACROSS = 6;
-  constexpr float FIRST = 1.0F;     // distance of the samples from the segment [px]
-  constexpr float STEP = 1.5F;      // [px]
-  constexpr int MIN_SAMPLES = 30;   // of a side, within both images
-  constexpr float NOISE = 4.0F;     // variance of intensities that means nothing
-  constexpr float MIDDLE = 128.0F;  // keeps sums small
+  constexpr float FIRST = 1.0F;    // distance of the samples from the segment [px]
+  constexpr float STEP = 1.5F;     // [px]
+  constexpr int MIN_SAMPLES = 30;  // of a side, within both images
   const auto mapped = transfer(h, reference_segment);
   if (!mapped)
   {
     return 0.0;
   }
-  // The part that both show, as fractions of the reference segment; what a homography does to fractions is neglected.
-  const Eigen::Vector2d direction = current_segment.direction();
-  const double start = (mapped->start - current_segment.start).dot(direction);
-  const double end = (mapped->end - current_segment.start).dot(direction);
-  const double length = current_segment.length();
-  const double first = std::clamp((std::clamp(start, 0.0, length) - start) / (end - start), 0.0, 1.0);
-  const double last = std::clamp((std::clamp(end, 0.0, length) - start) / (end - start), 0.0, 1.0);
+  const auto [first, last] = partInCommon(*mapped, current_segment);
 
   // The homography is linear in the samples' homogeneous coordinates.
   const Eigen::Vector2d along = reference_segment.end - reference_segment.start;
@@ -47,12 +99,7 @@ double sideCorrelation(const cv::Mat& reference, const cv::Mat& current, const E
   double best = -1.0;
   for (const double side : { -1.0, 1.0 })
   {
-    float sum_a = 0.0F;
-    float sum_b = 0.0F;
-    float sum_aa = 0.0F;
-    float sum_bb = 0.0F;
-    float sum_ab = 0.0F;
-    int n = 0;
+    PairedIntensities samples;
     for (int i = 0; i < ALONG; ++i)
     {
       const double fraction = first + (last - first) * (i + 0.5) / ALONG;
@@ -67,27 +114,15 @@ double sideCorrelation(const cv::Mat& reference, const cv::Mat& current, const E
         const Eigen::Vector3f seen = on_line_there + offset * across_there;
         const float scale = 1.0F / seen.z();
         const Eigen::Vector2f there = scale * seen.head<2>();
-        if (!(seen.z() > 0.0F) || !from.contains(at.x(), at.y()) || !to.contains(there.x(), there.y()))
+        if (seen.z() > 0.0F && from.contains(at.x(), at.y()) && to.contains(there.x(), there.y()))
         {
-          continue;
+          samples.add(from.at(at.x(), at.y()), to.at(there.x(), there.y()));
         }
-        const float a = from.at(at.x(), at.y()) - MIDDLE;
-        const float b = to.at(there.x(), there.y()) - MIDDLE;
-        sum_a += a;
-        sum_b += b;
-        sum_aa += a * a;
-        sum_bb += b * b;
-        sum_ab += a * b;
-        ++n;
       }
     }
-    if (n >= MIN_SAMPLES)
+    if (samples.count() >= MIN_SAMPLES)
     {
-      const float samples = static_cast<float>(n);
-      const float variance_a = sum_aa / samples - sum_a / samples * (sum_a / samples);
-      const float variance_b = sum_bb / samples - sum_b / samples * (sum_b / samples);
-      const float covariance = sum_ab / samples - sum_a / samples * (sum_b / samples);
-      best = std::max<double>(best, covariance / std::sqrt((variance_a + NOISE) * (variance_b + NOISE)));
+      best = std::max(best, samples.correlation());
     }
   }
   return best;

@@ -178,6 +178,15 @@ public:
 private:
   TrackedHomography trackFrom(const std::vector<cv::Mat>& pyramid, const Eigen::Matrix3d& predicted,
                               int coarsest) const;
+  /**
+   * Improves h in one level of the pyramids.
+   * @param verified that RANSAC agreed with h in a coarser level. @param result what is counted, and the points of level 0.
+   * @return whether h can be relied on; if not, it says nothing any more.
+   */
+  bool trackLevel(const cv::Mat& current, std::size_t level, bool verified, Eigen::Matrix3d& h,
+                  TrackedHomography& result) const;
+  /** Sets h to what most corners agree with, and the corners' shifts to those that it leaves; false when too few agree. */
+  bool verify(std::vector<FoundCorner>& corners, Eigen::Matrix3d& h) const;
   std::vector<FoundCorner> alignAll(const cv::Mat& current, std::size_t level, const Eigen::Matrix3d& h, int iterations,
                                     int& looked_for) const;
 
@@ -262,69 +271,15 @@ TrackedHomography HomographyAligner::Impl::track(const cv::Mat& current, const E
 TrackedHomography HomographyAligner::Impl::trackFrom(const std::vector<cv::Mat>& pyramid,
                                                      const Eigen::Matrix3d& predicted, int coarsest) const
 {
-  constexpr int COARSE_ITERATIONS = 5;
-  constexpr int FINE_ITERATIONS = 2;
-  constexpr int FINE_ROUNDS = 2;
-  // Widths of the fits, times max_residual: what hides a part still looks a little like it, a few pixels off.
-  constexpr std::array<double, FINE_ROUNDS> WIDTHS = { 2.0, 1.0 };
   TrackedHomography result;
   Eigen::Matrix3d h = predicted;
-  bool verified = false;  // by RANSAC
+  bool verified = false;
   for (int level = coarsest; level >= 0; --level)
   {
     const std::size_t l = static_cast<std::size_t>(level);
     const Eigen::Matrix3d down = toLevel(level);
     Eigen::Matrix3d h_level = down * h * down.inverse();
-    const int rounds = level == 0 && verified ? FINE_ROUNDS : 1;
-    for (int round = 0; round < rounds; ++round)
-    {
-      std::vector<FoundCorner> corners =
-          alignAll(pyramid[l], l, h_level, verified ? FINE_ITERATIONS : COARSE_ITERATIONS, result.looked_for);
-      if (static_cast<int>(corners.size()) < params_.min_supporting)
-      {
-        verified = false;
-        break;
-      }
-      if (!verified)
-      {
-        Correspondences pairs;
-        for (const FoundCorner& corner : corners)
-        {
-          pairs.push_back({ corner.at, corner.alignment.found });
-        }
-        const std::optional<Eigen::Matrix3d> found = mostAgreed(pairs, params_);
-        if (!found)
-        {
-          break;
-        }
-        verified = true;
-        // The shifts that this homography leaves.
-        const Eigen::Matrix3d inverse = found->inverse();
-        for (FoundCorner& corner : corners)
-        {
-          corner.alignment.shift = corner.at - transfer(inverse, corner.alignment.found);
-        }
-        h_level = *found;
-      }
-      ShiftFit fit(WIDTHS[static_cast<std::size_t>(round)] * params_.max_residual);
-      for (const FoundCorner& corner : corners)
-      {
-        fit.add(corner.at, corner.alignment.shift, corner.patch->information);
-      }
-      const std::optional<Eigen::Matrix3d> left = fit.solve();
-      if (!left)
-      {
-        verified = false;
-        break;
-      }
-      // What h shows at x is the stored view at left x.
-      h_level = h_level * left->inverse();
-      if (level == 0)
-      {
-        result.points = fit.supporting(*left, params_.max_residual, result.rms);
-        result.supporting = static_cast<int>(result.points.size());
-      }
-    }
+    verified = trackLevel(pyramid[l], l, verified, h_level, result);
     h = down.inverse() * h_level * down;
     if (!verified)
     {
@@ -341,6 +296,66 @@ TrackedHomography HomographyAligner::Impl::trackFrom(const std::vector<cv::Mat>&
     result.h = normalizedHomography(h);
   }
   return result;
+}
+
+bool HomographyAligner::Impl::trackLevel(const cv::Mat& current, std::size_t level, bool verified, Eigen::Matrix3d& h,
+                                         TrackedHomography& result) const
+{
+  constexpr int COARSE_ITERATIONS = 5;
+  constexpr int FINE_ITERATIONS = 2;
+  constexpr std::size_t FINE_ROUNDS = 2;
+  // Widths of the fits, times max_residual: what hides a part still looks a little like it, a few pixels off.
+  constexpr std::array<double, FINE_ROUNDS> WIDTHS = { 2.0, 1.0 };
+  const std::size_t rounds = level == 0 && verified ? FINE_ROUNDS : 1;
+  for (std::size_t round = 0; round < rounds; ++round)
+  {
+    std::vector<FoundCorner> corners =
+        alignAll(current, level, h, verified ? FINE_ITERATIONS : COARSE_ITERATIONS, result.looked_for);
+    if (static_cast<int>(corners.size()) < params_.min_supporting || (!verified && !verify(corners, h)))
+    {
+      return false;
+    }
+    verified = true;
+    ShiftFit fit(WIDTHS[round] * params_.max_residual);
+    for (const FoundCorner& corner : corners)
+    {
+      fit.add(corner.at, corner.alignment.shift, corner.patch->information);
+    }
+    const std::optional<Eigen::Matrix3d> left = fit.solve();
+    if (!left)
+    {
+      return false;
+    }
+    // What h shows at x is the stored view at left x.
+    h = h * left->inverse();
+    if (level == 0)
+    {
+      result.points = fit.supporting(*left, params_.max_residual, result.rms);
+      result.supporting = static_cast<int>(result.points.size());
+    }
+  }
+  return true;
+}
+
+bool HomographyAligner::Impl::verify(std::vector<FoundCorner>& corners, Eigen::Matrix3d& h) const
+{
+  Correspondences pairs;
+  for (const FoundCorner& corner : corners)
+  {
+    pairs.push_back({ corner.at, corner.alignment.found });
+  }
+  const std::optional<Eigen::Matrix3d> agreed = mostAgreed(pairs, params_);
+  if (!agreed)
+  {
+    return false;
+  }
+  h = *agreed;
+  const Eigen::Matrix3d inverse = h.inverse();
+  for (FoundCorner& corner : corners)
+  {
+    corner.alignment.shift = corner.at - transfer(inverse, corner.alignment.found);
+  }
+  return true;
 }
 
 }  // namespace view_servo
