@@ -10,6 +10,7 @@
 #include <ros/console.h>
 #include <ros/time.h>
 
+#include <chrono>
 #include <cstdint>
 #include <exception>
 #include <utility>
@@ -74,12 +75,19 @@ std::string CameraInput::problem() const
 
 void CameraInput::onImage()
 {
-  constexpr int OFTEN = 5;  // a calibration may come after its image
+  // A calibration may come after its image. What waits while a frame is worked on comes all at once, and images first.
+  constexpr int OFTEN = 5;
+  constexpr std::chrono::milliseconds LONG(150);
+  const auto now = std::chrono::steady_clock::now();
   std::string problem;
   {
     const std::lock_guard<std::mutex> lock(mutex_);
     ++images_;
-    if (++unpaired_ < OFTEN)
+    if (++unpaired_ == 1)
+    {
+      unpaired_since_ = now;
+    }
+    if (unpaired_ < OFTEN || now - unpaired_since_ < LONG)
     {
       return;
     }

@@ -10,10 +10,12 @@
 #include "view_servo/SetView.h"
 #include "view_servo/WantedView.h"
 #include "view_servo/ros/call_service.h"
+#include "view_servo/ros/camera_input.h"
 #include "view_servo/views/view_store.h"
 
 #include <diagnostic_msgs/DiagnosticArray.h>
 #include <gtest/gtest.h>
+#include <ros/callback_queue.h>
 
 #include <algorithm>
 #include <cmath>
@@ -480,6 +482,43 @@ TEST_F(StreamingTest, NamesBothTopicsWhenTheirStampsDifferOrOneIsSilent)
     send_image();
     send_info();
   }));
+}
+
+TEST_F(StreamingTest, CalibrationsThatAreHeardAfterAllTheirImagesAreNotMissing)
+{
+  constexpr std::size_t WAITING = 5;
+  // Nothing is heard of what comes to this queue before the test asks it.
+  ros::CallbackQueue queue;
+  ros::NodeHandle nh("busy");
+  nh.setCallbackQueue(&queue);
+  std::size_t frames = 0;
+  std::vector<std::string> problems;
+  const CameraInput input(
+      nh, CameraInputParams(), [&](const CameraFrame&) { ++frames; },
+      [&](const std::string& problem) { problems.push_back(problem); });
+  const Recorder<sensor_msgs::Image> images("busy/image_raw");
+  const Recorder<sensor_msgs::CameraInfo> infos("busy/camera_info");
+  const ros::Publisher image_publisher = ros::NodeHandle().advertise<sensor_msgs::Image>("busy/image_raw", WAITING);
+  const ros::Publisher info_publisher =
+      ros::NodeHandle().advertise<sensor_msgs::CameraInfo>("busy/camera_info", WAITING);
+  ASSERT_TRUE(
+      waitUntil([&] { return image_publisher.getNumSubscribers() > 0 && info_publisher.getNumSubscribers() > 0; }));
+  std::vector<sensor_msgs::CameraInfo> waiting;
+  for (std::size_t i = 0; i < WAITING; ++i)
+  {
+    waiting.push_back(FakeCamera("none").infoOf(picture_, ros::Time(100.0 + 0.03 * static_cast<double>(i))));
+    image_publisher.publish(toImage(picture_, sensor_msgs::image_encodings::MONO8, waiting.back().header));
+  }
+  ASSERT_TRUE(waitUntil([&] { return images.messages().size() == WAITING; }));
+  for (const sensor_msgs::CameraInfo& info : waiting)
+  {
+    info_publisher.publish(info);
+  }
+  ASSERT_TRUE(waitUntil([&] { return infos.messages().size() == WAITING; }));
+  queue.callAvailable();
+  EXPECT_EQ(frames, WAITING);
+  EXPECT_TRUE(problems.empty()) << problems.front();
+  EXPECT_EQ(input.problem(), "");
 }
 
 }  // namespace

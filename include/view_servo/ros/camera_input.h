@@ -15,6 +15,7 @@
 #include <sensor_msgs/CameraInfo.h>
 #include <sensor_msgs/Image.h>
 
+#include <chrono>
 #include <functional>
 #include <mutex>
 #include <string>
@@ -106,14 +107,15 @@ private:
   mutable std::mutex waiting_mutex_;  // held by the one who waits; taken before mutex_
   mutable std::mutex mutex_;          // guards what follows, up to the transport
   CameraFrame latest_;
-  std::string fault_;    // of the last pair
-  std::string problem_;  // why the last frame was not usable, or none came
-  int unpaired_ = 0;     // images since the last camera_info
-  int images_ = 0;       // images that have come since the last check
-  int infos_ = 0;        // messages on camera_info that have come since the last check
-  int pairs_ = 0;        // images and camera_info with one stamp, since the last check
-  double rate_ = 0.0;    // of usable frames [Hz]
-  int frames_ = 0;       // usable, since the last diagnosis
+  std::string fault_;                                     // of the last pair
+  std::string problem_;                                   // why the last frame was not usable, or none came
+  int unpaired_ = 0;                                      // images since the last camera_info
+  std::chrono::steady_clock::time_point unpaired_since_;  // when the first of them came
+  int images_ = 0;                                        // images that have come since the last check
+  int infos_ = 0;                                         // messages on camera_info that have come since the last check
+  int pairs_ = 0;                                         // images and camera_info with one stamp, since the last check
+  double rate_ = 0.0;                                     // of usable frames [Hz]
+  int frames_ = 0;                                        // usable, since the last diagnosis
   ros::WallTime last_diagnosis_;
 
   image_transport::ImageTransport transport_;
