@@ -139,7 +139,7 @@ TEST(ArmReplay, HomographiesAndTwistsAgreeWithTheTruth)
   bool sent = false;
   std::unique_ptr<actionlib::SimpleActionClient<ServoToViewAction>> client;
   {
-    ChildProcess play({ "rosbag", "play", "--clock", "--quiet", "--rate=0.5", "--wait-for-subscribers", "--topics",
+    ChildProcess play({ "rosbag", "play", "--clock", "--quiet", playRate(0.5), "--wait-for-subscribers", "--topics",
                         "/camera/image_raw", "/camera/camera_info", "/tf", "/joint_states", "--bags=" + bag });
     ASSERT_TRUE(waitUntil([] { return ros::Time::isValid(); }));  // a client waits for that without end
     client = std::make_unique<actionlib::SimpleActionClient<ServoToViewAction>>("servo", false);

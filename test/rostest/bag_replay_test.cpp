@@ -126,7 +126,7 @@ protected:
 
   static std::vector<std::string> player(const std::vector<std::string>& more, const std::string& bag = bag_)
   {
-    std::vector<std::string> command{ "rosbag", "play", "--clock", "--quiet", bag };
+    std::vector<std::string> command{ "rosbag", "play", "--clock", "--quiet", playRate(1.0), bag };
     command.insert(command.end(), more.begin(), more.end());
     return command;
   }

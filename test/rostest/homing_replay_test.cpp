@@ -72,7 +72,7 @@ TEST_P(HomingReplayTest, HeadingsAndArrivalAgreeWithTheTruth)
   }
   const Recorder<Heading> headings("heading");
   {
-    ChildProcess play({ "rosbag", "play", "--clock", "--quiet", "--rate=0.6", "--wait-for-subscribers", "--topics",
+    ChildProcess play({ "rosbag", "play", "--clock", "--quiet", playRate(0.6), "--wait-for-subscribers", "--topics",
                         "/camera/image_raw", "/camera/camera_info", "/odom", "/tf", "/tf_static", "--bags=" + bag });
     bool played = false;
     for (int patience = 0; patience < 4 && !played; ++patience)

@@ -49,6 +49,12 @@ constexpr double SLOWDOWN = 1.0;
 #endif
 constexpr double DEADLINE = 20.0 * SLOWDOWN;  // [s]; nothing here takes nearly as long on an idle machine
 
+/** For rosbag play: how fast a bag is played, times its own pace; slower where nodes are built with sanitizers. */
+inline std::string playRate(double rate)
+{
+  return "--rate=" + std::to_string(rate / SLOWDOWN);
+}
+
 /** Calls `step` and asks `predicate`, often, until it holds or the deadline has passed. Wall time. */
 inline bool waitUntil(const std::function<bool()>& predicate, const std::function<void()>& step = nullptr)
 {
