@@ -17,9 +17,9 @@ namespace view_servo
  */
 struct EuclideanHomography
 {
-  Eigen::Matrix3d rotation;                   ///< R
-  Eigen::Vector3d translation_over_distance;  ///< t / d
-  Eigen::Vector3d normal;                     ///< n
+  Eigen::Matrix3d rotation = Eigen::Matrix3d::Identity();               ///< R
+  Eigen::Vector3d translation_over_distance = Eigen::Vector3d::Zero();  ///< t / d
+  Eigen::Vector3d normal = Eigen::Vector3d::UnitZ();                    ///< n
 
   /** R + (t / d) nᵀ: x_cur ~ H x_ref in normalised coordinates, with determinant d_cur / d. */
   Eigen::Matrix3d matrix() const
