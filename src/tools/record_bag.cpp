@@ -20,6 +20,7 @@
 
 #include <cmath>
 #include <cstdint>
+#include <cstdlib>
 #include <filesystem>
 #include <fstream>
 #include <iostream>
@@ -482,7 +483,9 @@ int main(int argc, char** argv)
   }
   catch (const std::exception& error)
   {
-    std::cerr << "record_bag: " << oneLine(error) << '\n';
+    std::cerr << "record_bag: " << oneLine(error) << std::endl;
   }
-  return BAD_INPUT;
+  // Not by the end of main(): a BagWriter may have had to keep a bag that cannot be closed, which class_loader of ROS 1.17,
+  // when rosbag's plugins are unloaded, has a line about after that of the error.
+  std::_Exit(BAD_INPUT);
 }
