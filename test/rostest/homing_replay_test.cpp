@@ -43,9 +43,10 @@ class HomingReplayTest : public ::testing::TestWithParam<const char*>
 
 TEST_P(HomingReplayTest, HeadingsAndArrivalAgreeWithTheTruth)
 {
-  constexpr double FAR = 0.3;             // [m]
-  constexpr double TOLERANCE = 5.0;       // of headings [degrees]
-  constexpr double LEAST_SHARE = 0.9;     // of those told while far
+  constexpr double FAR = 0.3;        // [m]
+  constexpr double TOLERANCE = 5.0;  // of headings [degrees]
+  // Of those told while far. With sanitizers, fewer images are matched in time.
+  constexpr double LEAST_SHARE = SLOWDOWN > 1.0 ? 0.8 : 0.9;
   constexpr double LEAST_ANSWERED = 0.6;  // of the images; a busy machine leaves some out
   constexpr double ARRIVAL = 0.03;        // [m]
 
