@@ -14,6 +14,30 @@ BaseVelocity towards(double speed, double heading, double turn_rate)
   return { speed * std::cos(heading), speed * std::sin(heading), turn_rate };
 }
 
+/** Proportional to what is left, but no slower than `least`; zero within the tolerance. */
+double approach(double left, double gain, double least, double most, double tolerance)
+{
+  return std::abs(left) <= tolerance ? 0.0 : std::copysign(std::clamp(gain * std::abs(left), least, most), left);
+}
+
+/**
+ * Drives along the end's x axis and back onto it. The distance across is made up for within some CONVERGENCE of way,
+ * without overshoot: with s the length of way driven, y'' + DAMPING / C y' + y / C² = 0.
+ */
+BaseVelocity alongLine(const Course& course, const PlanarPose& base_in_odom)
+{
+  constexpr double CONVERGENCE = 0.1;   // [m]
+  constexpr double DAMPING = 2.5;       // 2 would be critical
+  constexpr double MOST_ACROSS = 0.03;  // from farther away, the base comes back at the same angle [m]
+  constexpr double FASTEST = 1e3;       // std::clamp() wants a finite limit [m/s]
+  const PlanarPose base = compose(inverse(course.end), base_in_odom);
+  const double speed =
+      approach(-base.x, course.gain, course.min_speed, std::min(course.max_speed, FASTEST), course.distance_tolerance);
+  const double across = std::clamp(base.y, -MOST_ACROSS, MOST_ACROSS) / CONVERGENCE;
+  const double turn_rate = -(DAMPING * std::abs(speed) * base.yaw + speed * across) / CONVERGENCE;
+  return { speed, 0.0, turn_rate };
+}
+
 }  // namespace
 
 BaseVelocity along(const Course& course, const PlanarPose& base_in_odom)
@@ -36,6 +60,14 @@ BaseVelocity along(const Course& course, const PlanarPose& base_in_odom)
       return left > 0.0 ? towards(std::min(course.speed, SLOWING * left + LAST_SPEED), course.heading - done.yaw, 0.0)
                         : BaseVelocity(BaseVelocity::Zero());
     }
+    case Course::TURN:
+    {
+      constexpr double FASTEST = 1e3;  // [rad/s]
+      const double left = wrapAngle(course.end.yaw - base_in_odom.yaw);
+      return { 0.0, 0.0, approach(left, course.turn_gain, course.min_turn_rate, FASTEST, course.yaw_tolerance) };
+    }
+    case Course::LINE:
+      return alongLine(course, base_in_odom);
     default:
       return BaseVelocity::Zero();
   }

@@ -18,17 +18,27 @@ struct Course
   enum Kind
   {
     STAND,    ///< nothing is known of where to go
-    TO_VIEW,  ///< straight to a pose, turning on the way
-    STEP      ///< a length in one direction, without turning (chapter 5 of the thesis)
+    TO_VIEW,  ///< straight to a pose, turning on the way: for a base that can slide
+    STEP,     ///< a length in one direction, without turning (chapter 5 of the thesis)
+    TURN,     ///< on the spot, to a yaw
+    LINE      ///< along a line to its end, ahead or back: for a base that cannot slide
   };
   Kind kind = STAND;
 
   // TO_VIEW.
-  PlanarPose view;         ///< base pose at the view, in odometry's frame
-  double gain = 1.0;       ///< the base's speed divided by its distance from the view [1/s]
-  double turn_gain = 1.0;  ///< the base's turn rate divided by its yaw error [1/s]
-  double min_speed = 0.0;  ///< the base is no slower, however near the view is [m/s]
-  double max_speed = std::numeric_limits<double>::infinity();  ///< the base is no faster, however far the view is [m/s]
+  PlanarPose view;  ///< base pose at the view, in odometry's frame
+
+  // TO_VIEW, TURN and LINE.
+  double gain = 1.0;           ///< the base's speed divided by its distance from the course's end [1/s]
+  double turn_gain = 1.0;      ///< the base's turn rate divided by its yaw error [1/s]
+  double min_speed = 0.0;      ///< the base is no slower, however near the end is [m/s]
+  double min_turn_rate = 0.0;  ///< TURN: the base turns no slower, however little is left [rad/s]
+  double max_speed = std::numeric_limits<double>::infinity();  ///< the base is no faster, however far the end is [m/s]
+
+  // TURN and LINE.
+  PlanarPose end;                   ///< TURN: its yaw; LINE: its x axis is the line. In odometry's frame.
+  double distance_tolerance = 0.0;  ///< LINE: the base stands when it is as near to the end, along the line [m]
+  double yaw_tolerance = 0.0;       ///< TURN: the base stands when it is as near to the yaw [rad]
 
   // STEP.
   PlanarPose start;      ///< base pose at its beginning, in odometry's frame
