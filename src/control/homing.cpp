@@ -146,31 +146,44 @@ public:
   ServoHoming(const HomingParams& params, const HomingTarget& target)
     : Homing(params, target),
       hypotheses_(params.hypotheses, target.camera.k(0, 0)),
-      tracker_(target.image, target.camera, target.mount, params.tracker)
+      tracker_(target.image, target.camera, target.mount, params.tracker),
+      law_(makeApproachLaw(params.approach, params.arrival_distance))
   {
   }
 
   Course course() const override
   {
-    Course course;
-    if (!view_in_odom_ || ended() || report_.state == HomingState::LOST || report_.state == HomingState::ACQUIRING)
+    if (!view_in_odom_ || ended() || report_.state == HomingState::ACQUIRING)
     {
-      return course;
+      return Course();
     }
-    course.kind = Course::TO_VIEW;
-    course.view = compose(*view_in_odom_, inverse(target_.mount.on_base));
-    course.gain = params_.gain;
-    course.turn_gain = params_.turn_gain;
+    if (report_.state == HomingState::LOST)
+    {
+      return wayBack();
+    }
+    Course course = law_->course();
     if (blind_)
     {
       // Matches alone do not say how far it is.
       course.max_speed = params_.blind_speed;
-      course.min_speed = tracker_.hasStructure() ? 0.0 : params_.blind_speed;
+      course.min_speed = tracker_.hasStructure() ? course.min_speed : params_.blind_speed;
     }
     return course;
   }
 
 protected:
+  void onOdometry(const PlanarPose& base_in_odom) override
+  {
+    if (view_in_odom_ && !ended())
+    {
+      const PlanarPose moved = compose(inverse(blind_to_), base_in_odom);
+      blind_to_ = base_in_odom;
+      blind_distance_ += moved.distance();
+      blind_turn_ += std::abs(moved.yaw);
+      approach(base_in_odom, false, false);
+    }
+  }
+
   void onMatches(double stamp, const HeadingEvidence& evidence, const PlanarPose& camera_in_odom) override
   {
     hypotheses_.update(evidence.pairs, camera_in_odom);
@@ -210,7 +223,8 @@ protected:
         located = !tracker_.depthsKnown() && locate(stamp, evidence.pairs, camera_in_odom);
       }
     }
-    if (!tracked_ && !located)
+    const bool trusted = !tracker_.hasStructure() || !view_in_odom_ || isNear(best.view_in_odom, camera_in_odom);
+    if (!tracked_ && !located && trusted)
     {
       // Follow the direction; the next image may say more.
       follow(stamp, best.view_in_odom);
@@ -246,8 +260,14 @@ protected:
           report_.odometry_delay = clocks_.estimate().value_or(report_.odometry_delay);
           clocks_due_ = stamp + CLOCKS_PERIOD;
         }
-        follow(stamp, compose(camera, { scale_ * result.pose.x, scale_ * result.pose.y, result.pose.yaw }));
+        const PlanarPose view = compose(camera, { scale_ * result.pose.x, scale_ * result.pose.y, result.pose.yaw });
+        follow(stamp, averageAtRest(*base, view));
       }
+    }
+    if (view_in_odom_)
+    {
+      approach(*odometry_.newest(), last_trace_ > last_known_, tracked_);
+      last_known_ = last_trace_;
     }
     judge(stamp, *base);
   }
@@ -256,6 +276,27 @@ private:
   static constexpr std::size_t ENOUGH_SUPPORT = 40;  // matches that structure is made from
   static constexpr double CLOCKS_PERIOD = 0.5;       // between two estimates of their offset, which take a while [s]
   static constexpr int MIN_UPDATES = 2;              // sets of matches that agree before a hypothesis is followed
+
+  /** The base's pose at the view, in odometry's frame. */
+  PlanarPose goalInOdom() const
+  {
+    return compose(*view_in_odom_, inverse(target_.mount.on_base));
+  }
+
+  /** Tells the law of approach what is known; see Situation. */
+  void approach(const PlanarPose& base_in_odom, bool known_anew, bool seen)
+  {
+    law_->update({ base_in_odom, goalInOdom(), known_anew, seen, [this](const PlanarPose& base) {
+                    return shareInSight(base);
+                  } });
+  }
+
+  /** Of the view, when the base is at a pose in the goal's frame. */
+  double shareInSight(const PlanarPose& base_in_goal) const
+  {
+    const PlanarPose view = target_.mount.ofCamera(inverse(base_in_goal));
+    return tracker_.shareInSight({ view.x / scale_, view.y / scale_, view.yaw });
+  }
 
   /** The view's base pose as seen from the base. */
   PlanarPose goalInBase(const PlanarPose& base) const
@@ -268,6 +309,57 @@ private:
     view_in_odom_ = view_in_odom;
     blind_ = !tracked_;
     last_trace_ = std::max(stamp, last_trace_);
+    seen_from_ = blind_to_ = *odometry_.newest();
+    blind_distance_ = blind_turn_ = 0.0;
+  }
+
+  /** A base that cannot slide stands to look: what is seen from one place is averaged. @param view in odometry's frame. */
+  PlanarPose averageAtRest(const PlanarPose& base_in_odom, const PlanarPose& view)
+  {
+    constexpr double AT_REST = 0.001;  // [m, rad]
+    constexpr int MOST = 10;           // images
+    const PlanarPose moved = compose(inverse(rest_), base_in_odom);
+    if (params_.approach.base == BaseKind::HOLONOMIC || moved.distance() > AT_REST || std::abs(moved.yaw) > AT_REST)
+    {
+      rest_ = base_in_odom;
+      images_at_rest_ = 1;
+      return view;
+    }
+    images_at_rest_ = std::min(images_at_rest_ + 1, MOST);
+    const double part = 1.0 / images_at_rest_;
+    const PlanarPose& mean = *view_in_odom_;
+    return { mean.x + part * (view.x - mean.x), mean.y + part * (view.y - mean.y),
+             wrapAngle(mean.yaw + part * wrapAngle(view.yaw - mean.yaw)) };
+  }
+
+  /** Whether a base that cannot slide goes on by odometry: its way may lead over where little of the view is in sight. */
+  bool mayGoOn() const
+  {
+    const ManoeuvreParams& limits = params_.approach.manoeuvre;
+    return params_.approach.base == BaseKind::DIFFERENTIAL && blind_distance_ <= limits.max_blind_distance &&
+           blind_turn_ <= limits.max_blind_turn &&
+           shareInSight(compose(inverse(goalInOdom()), *odometry_.newest())) < limits.min_share;
+  }
+
+  /** A base that has gone on blindly goes back to where it saw the view. */
+  Course wayBack() const
+  {
+    constexpr double THERE = 0.02;    // [m]
+    constexpr double PATIENCE = 1.0;  // one of the next images may show the view [s]
+    Course course;
+    if (params_.approach.base == BaseKind::DIFFERENTIAL && report_.stamp - last_trace_ > PATIENCE)
+    {
+      const PlanarPose base = *odometry_.newest();
+      course = law_->course();
+      course.max_speed = params_.blind_speed;
+      course.distance_tolerance = THERE;
+      course.yaw_tolerance = params_.approach.yaw_tolerance;
+      const bool there = compose(inverse(base), seen_from_).distance() <= THERE;
+      // It has turned first, then driven straight.
+      course.kind = there ? Course::TURN : Course::LINE;
+      course.end = there ? seen_from_ : PlanarPose{ seen_from_.x, seen_from_.y, base.yaw };
+    }
+    return course;
   }
 
   /** After the points were not found: where are they by matches? */
@@ -304,6 +396,21 @@ private:
     }
     contradictions_ = 0;
     tracker_.extend(agreeing, { pose.x / scale_, pose.y / scale_, pose.yaw });
+  }
+
+  /**
+   * Whether matches put the view about where its points were last: one set that says otherwise is no reason to forget
+   * these. @param view_in_odom by matches.
+   */
+  bool isNear(const PlanarPose& view_in_odom, const PlanarPose& camera_in_odom) const
+  {
+    constexpr double DIRECTION = 0.35;  // [rad]
+    constexpr double NEAR = 0.3;        // where a direction means little [m]
+    const PlanarPose other = compose(inverse(camera_in_odom), view_in_odom);
+    const PlanarPose known = compose(inverse(camera_in_odom), *view_in_odom_);
+    const bool same_direction =
+        known.distance() < NEAR || std::abs(wrapAngle(other.heading() - known.heading())) < DIRECTION;
+    return same_direction && std::abs(wrapAngle(other.yaw - known.yaw)) < DIRECTION;
   }
 
   void contradict()
@@ -348,10 +455,12 @@ private:
     constexpr double ARRIVED_DISPLACEMENT = 1.5;  // of the view's points, in the median [px]
     constexpr double ARRIVED_CONFIDENCE = 0.75;   // share of the points that must be there
     constexpr double AT_VIEW_DISPLACEMENT = 15.0;
-    constexpr double COAST = 0.5;  // matches are older than the image when they come [s]
+    constexpr double COAST = 0.5;          // matches are older than the image when they come [s]
+    constexpr double LONGEST_BLIND = 3.0;  // that a base goes on by odometry [s]
     if (!view_in_odom_)
     {
       giveUpAfter(stamp, started_, "the view was not found", HomingState::ACQUIRING, "looking for the view");
+      way_known_ = stamp;
       return;
     }
     const PlanarPose goal = goalInBase(base);
@@ -363,9 +472,25 @@ private:
     report_.roi_min = report_.heading - half_width;
     report_.roi_max = report_.heading + half_width;
 
+    report_.manoeuvre = law_->text();
     report_.at_view = false;
     const bool blank = std::isnan(report_.similarity);
-    if (blank || stamp - last_trace_ > (blind_ ? COAST : 0.0))
+    const double unseen = stamp - last_trace_;
+    if (!law_->failure().empty())
+    {
+      setState(HomingState::FAILED, law_->failure());
+      return;
+    }
+    if (law_->course().kind != Course::STAND)
+    {
+      way_known_ = stamp;
+    }
+    else if (stamp - way_known_ > params_.lost_timeout)
+    {
+      setState(HomingState::FAILED, law_->text());
+      return;
+    }
+    if (blank || unseen > (mayGoOn() ? LONGEST_BLIND : blind_ ? COAST : 0.0))
     {
       within_since_ = NOT_A_NUMBER;
       giveUpAfter(stamp, last_trace_, "the view was lost", HomingState::LOST,
@@ -384,7 +509,7 @@ private:
     report_.at_view = report_.distance <= params_.arrival_distance && std::abs(goal.yaw) <= params_.arrival_yaw &&
                       report_.displacement <= AT_VIEW_DISPLACEMENT && report_.similarity >= params_.min_similarity;
     const bool within =
-        in_place && report_.distance <= params_.distance_tolerance && std::abs(goal.yaw) <= params_.yaw_tolerance;
+        in_place && report_.distance <= law_->tolerance() && std::abs(goal.yaw) <= params_.approach.yaw_tolerance;
     if (!within)
     {
       within_since_ = NOT_A_NUMBER;
@@ -432,11 +557,20 @@ private:
   double clocks_due_ = 0.0;  // stamp of the image after which the offset of clocks is estimated anew
   HeadingHypotheses hypotheses_;
   ViewTracker tracker_;
+  std::unique_ptr<ApproachLaw> law_;
   std::optional<PlanarPose> view_in_odom_;  // the view's level camera
   double scale_ = 1.0;                      // metres in a unit of the tracker's
   std::deque<Place> trail_;                 // of the camera, newest last
   bool tracked_ = false;                    // in the last image
   bool blind_ = true;                       // what was followed last were matches
+  double last_known_ = 0.0;                 // last_trace_ when the law of approach was told of it
+  double way_known_ = 0.0;                  // stamp of the last image with a way to the view
+  PlanarPose rest_;                         // where the base stood when the first of these images was taken
+  int images_at_rest_ = 0;                  // in a row
+  PlanarPose seen_from_;                    // base pose in odometry's frame when the view was last seen
+  PlanarPose blind_to_;                     // the newest base pose, to which the next two lead from there
+  double blind_distance_ = 0.0;             // [m]
+  double blind_turn_ = 0.0;                 // [rad]
   double within_since_ = NOT_A_NUMBER;
   int contradictions_ = 0;
 };
@@ -450,11 +584,7 @@ std::vector<Parameter> rowsOfHoming(HomingParams& params)
                        "rotation, straight to a "
                        "goal ahead, in steps, until the correlation of the gradients has risen and drops again"),
     real("lost_timeout", params.lost_timeout, "s", "> 0", "time without a trace of the view, after which it gives up"),
-    real("gain", params.gain, "1/s", "> 0", "speed per distance"),
-    real("turn_gain", params.turn_gain, "1/s", "> 0", "turn rate per yaw error"),
     real("blind_speed", params.blind_speed, "m/s", "> 0", "speed while only the heading is known"),
-    real("distance_tolerance", params.distance_tolerance, "m", "> 0", "distance from the view at which it has arrived"),
-    real("yaw_tolerance", params.yaw_tolerance, "rad", "> 0", "yaw error at which it has arrived"),
     real("dwell", params.dwell, "s", ">= 0", "time that it has to stay within the tolerances"),
     real("arrival_distance", params.arrival_distance, "m", "> 0",
          "distance at which the heading is published as ARRIVED"),
@@ -491,8 +621,8 @@ Progress toProgress(const HomingReport& report)
 
 std::vector<Parameter> parameters(HomingParams& params)
 {
-  return joined({ rowsOfHoming(params), parameters(params.hypotheses), parameters(params.tracker),
-                  parameters(params.vote), parameters(params.arrival) });
+  return joined({ rowsOfHoming(params), parameters(params.approach), parameters(params.hypotheses),
+                  parameters(params.tracker), parameters(params.vote), parameters(params.arrival) });
 }
 
 std::vector<std::string> HomingParams::validate() const
@@ -500,6 +630,9 @@ std::vector<std::string> HomingParams::validate() const
   HomingParams copy = *this;
   Faults faults;
   faults.add(faultsOf(rowsOfHoming(copy)));
+  faults.add(faultsOf(parameters(copy.approach)));
+  faults.require(mode != HomingMode::THESIS || approach.base == BaseKind::HOLONOMIC,
+                 "mode thesis drives without turning: it needs base: holonomic");
   faults.add(hypotheses.validate());
   faults.add(tracker.validate());
   faults.add(vote.validate());

@@ -342,6 +342,42 @@ ViewTracker::Result ViewTracker::track(const cv::Mat& current, const PlanarPose&
   return result;
 }
 
+double ViewTracker::shareInSight(const PlanarPose& view_in_camera) const
+{
+  constexpr std::size_t ENOUGH = 48;  // for a share to some per cent
+  constexpr int COLUMNS = 8;
+  constexpr int ROWS = 6;
+  const auto sees = [this](const Landmark& landmark, const PlanarPose& pose) {
+    const double size = 1.0 / depthRatio(landmark, pose);
+    return size > 1.0 / MAX_SCALE && size < MAX_SCALE && insideReference(pixelOf(project(landmark, pose)));
+  };
+  const PlanarPose turned{ 0.0, 0.0, view_in_camera.yaw };
+  int by_turn = 0;
+  int by_motion = 0;
+  for (int i = 0; i < COLUMNS * ROWS; ++i)
+  {
+    const Eigen::Vector2d pixel((i % COLUMNS + 0.5) / COLUMNS * reference_.cols,
+                                (i / COLUMNS + 0.5) / ROWS * reference_.rows);
+    const Landmark point{ levelOf(pixel), 1.0 / params_.assumed_depth };
+    by_turn += sees(point, turned) ? 1 : 0;
+    by_motion += sees(point, view_in_camera) ? 1 : 0;
+  }
+  constexpr double ALL = COLUMNS * ROWS;
+  if (landmarks_.empty())
+  {
+    return by_motion / ALL;
+  }
+  const std::size_t stride = std::max<std::size_t>(1, landmarks_.size() / ENOUGH);
+  double known = 0.0;
+  double in_sight = 0.0;
+  for (std::size_t i = 0; i < landmarks_.size(); i += stride)
+  {
+    known += 1.0;
+    in_sight += sees(landmarks_[i].landmark, view_in_camera) ? 1.0 : 0.0;
+  }
+  return std::min(in_sight / known, by_turn / ALL);
+}
+
 ViewTracker::Result ViewTracker::locate(const Correspondences& matches) const
 {
   constexpr double COARSE = 2.0;  // times max_residual: matches are less exact than tracked patches

@@ -278,11 +278,11 @@ TEST(MakeHoming, RefusesBadParametersNamingAllFaults)
   params.arrival.drop = 0.0;
   params.tracker.window = 20;
   params.lost_timeout = 0.0;
-  params.gain = -1.0;
-  params.turn_gain = 0.0;
+  params.approach.gain = -1.0;
+  params.approach.turn_gain = 0.0;
   params.blind_speed = 0.0;
-  params.distance_tolerance = 0.0;
-  params.yaw_tolerance = 0.0;
+  params.approach.distance_tolerance = 0.0;
+  params.approach.yaw_tolerance = 0.0;
   params.dwell = -0.1;
   params.arrival_distance = 0.0;
   params.arrival_yaw = 0.0;
@@ -455,7 +455,7 @@ TEST(Homing, MatchesGiveTheDirectionInBaseLink)
     const BaseVelocity command = homing->command();
     EXPECT_NEAR(std::atan2(command.y(), command.x()), goal.heading(), 2.0 * DEGREE);
     EXPECT_NEAR(command.head<2>().norm(), params.blind_speed, 1e-9);
-    EXPECT_NEAR(command.z(), params.turn_gain * goal.yaw, 0.5 * DEGREE);
+    EXPECT_NEAR(command.z(), params.approach.turn_gain * goal.yaw, 0.5 * DEGREE);
     const std::vector<double>& votes = homing->report().histogram;
     ASSERT_EQ(votes.size(), static_cast<std::size_t>(params.vote.bins));
     // They are cast by the camera, which need not move as the base does where both turn.
@@ -484,8 +484,8 @@ TEST(Homing, Arrives)
     run.runFor(40.0);
     ASSERT_EQ(run.report().state, HomingState::ARRIVED) << run.report().reason;
     EXPECT_TRUE(run.report().at_view);
-    EXPECT_LE(run.report().distance, servoParams().distance_tolerance);
-    EXPECT_LE(std::abs(run.report().yaw_error), servoParams().yaw_tolerance);
+    EXPECT_LE(run.report().distance, servoParams().approach.distance_tolerance);
+    EXPECT_LE(std::abs(run.report().yaw_error), servoParams().approach.yaw_tolerance);
     EXPECT_LT(run.base().distance(), 0.008);
     EXPECT_LT(std::abs(run.base().yaw), 0.4 * DEGREE);
     EXPECT_LT(run.travelled(), 1.5 * start.distance());
@@ -554,8 +554,8 @@ TEST(Homing, EndsOnlyWhereTheViewsAreSimilar)
   {
     HomingParams params = servoParams();
     params.min_similarity = least;
-    params.distance_tolerance = 0.01;
-    params.yaw_tolerance = 0.01;
+    params.approach.distance_tolerance = 0.01;
+    params.approach.yaw_tolerance = 0.01;
     Drive run(walls, params, { -0.2, 0.05, 0.0 });
     run.runFor(6.0, Drive::Sight::NOISY);
     EXPECT_GT(run.report().similarity, 0.3);
@@ -748,6 +748,65 @@ TEST(ThesisHoming, KeepsTheDirectionOfTheStepThoughTheBaseTurns)
   const BaseVelocity after = homing->command();
   EXPECT_NEAR(std::atan2(after.y(), after.x()), std::atan2(before.y(), before.x()) - 0.3, 1e-9);
   EXPECT_EQ(after.z(), 0.0);
+}
+
+// ---- a base that cannot slide
+
+namespace
+{
+HomingParams differentialParams()
+{
+  HomingParams params = servoParams();
+  params.approach.base = BaseKind::DIFFERENTIAL;
+  return params;
+}
+
+}  // namespace
+
+TEST(DifferentialHoming, ArrivesWithoutSliding)
+{
+  const Walls walls({ 0.1, 0.05, 0.0 });
+  for (const PlanarPose& start : { PlanarPose{ -0.6, 0.2, 0.1 }, { -0.5, -0.3, -0.2 }, { 0.3, -0.1, 0.15 } })
+  {
+    Drive run(walls, differentialParams(), start);
+    bool told = false;
+    while (run.time() < 130.0 && !run.ended())
+    {
+      run.step();
+      ASSERT_EQ(run.homing().command().y(), 0.0);
+      told = told || !run.report().manoeuvre.empty();
+    }
+    EXPECT_EQ(run.report().state, HomingState::ARRIVED)
+        << run.report().reason << ", from " << start.x << ' ' << start.y;
+    EXPECT_LT(run.base().distance(), 0.01);
+    EXPECT_LT(std::abs(run.base().yaw), 0.5 * DEGREE);
+    EXPECT_TRUE(told);
+  }
+}
+
+/** Something walks between, where the view should be in sight: the base stands, and goes on when it has passed. */
+TEST(DifferentialHoming, StandsWhileTheViewIsHidden)
+{
+  const Walls walls;
+  Drive run(walls, differentialParams(), { -0.6, 0.1, 0.0 });
+  run.runFor(4.0);
+  ASSERT_TRUE(run.follows()) << run.report().reason;
+  ASSERT_FALSE(run.homing().command().isZero());
+  const PlanarPose seen_from = run.base();
+  run.runFor(3.0, Drive::Sight::NO_MATCHES);
+  EXPECT_EQ(run.report().state, HomingState::LOST);
+  EXPECT_LT(compose(inverse(seen_from), run.base()).distance(), 0.06);
+  run.runFor(100.0);
+  EXPECT_EQ(run.report().state, HomingState::ARRIVED) << run.report().reason;
+  EXPECT_LT(run.base().distance(), 0.01);
+}
+
+TEST(MakeHoming, RefusesTheThesisWayForABaseThatCannotSlide)
+{
+  const Walls walls;
+  HomingParams params = differentialParams();
+  params.mode = HomingMode::THESIS;
+  EXPECT_NE(messageOf(params, walls.target()).find("it needs base: holonomic"), std::string::npos);
 }
 
 }  // namespace view_servo

@@ -443,6 +443,29 @@ TEST_F(ViewTrackerTest, FindsNothingWithAHopelessPrediction)
   EXPECT_EQ(nothing.looked_for, 0);
 }
 
+/** Before and after it has landmarks. */
+TEST_F(ViewTrackerTest, TellsTheShareInSight)
+{
+  const ViewTracker fresh(desk().reference(), desk().world().camera, desk().mount(), ViewTrackerParams());
+  const ViewTracker with_landmarks = desk().tracker();
+  const double field = 2.0 * std::atan(0.5 * desk().world().camera.width / desk().world().camera.k(0, 0));
+  for (const ViewTracker* tracker : { &fresh, &with_landmarks })
+  {
+    EXPECT_GT(tracker->shareInSight({}), 0.95);
+    for (const double sense : { -1.0, 1.0 })
+    {
+      const double half = tracker->shareInSight({ 0.0, 0.0, 0.5 * sense * field });
+      EXPECT_GT(half, 0.2);
+      EXPECT_LT(half, 0.6);
+      EXPECT_LT(tracker->shareInSight({ 0.0, 0.0, 1.1 * sense * field }), 0.02);
+      EXPECT_LT(tracker->shareInSight({ 0.0, 0.0, 3.0 * sense }), 0.02);
+    }
+    EXPECT_GT(tracker->shareInSight({ 0.5, 0.0, 0.0 }), 0.9);   // from behind the view
+    EXPECT_LT(tracker->shareInSight({ -1.2, 0.0, 0.0 }), 0.9);  // from ahead of it
+    EXPECT_EQ(tracker->shareInSight({ -30.0, 0.0, 0.0 }), 0.0);
+  }
+}
+
 TEST_F(ViewTrackerTest, RefusesImagesOfAnotherSize)
 {
   const ViewTracker tracker = desk().tracker();

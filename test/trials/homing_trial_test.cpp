@@ -198,7 +198,7 @@ TEST(HomingTrial, RefusesBadParametersAndPlaces)
   const World world = worldOf("desk");
   HomingTrialParams params;
   params.max_duration = 0.1;
-  params.homing.gain = 0.0;
+  params.homing.approach.gain = 0.0;
   params.homing.vote.bins = 1;
   HomingTrials trials(world, params);
   try

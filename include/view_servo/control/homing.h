@@ -2,6 +2,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include "view_servo/control/approach_law.h"
 #include "view_servo/control/arrival_detector.h"
 #include "view_servo/control/clock_offset.h"
 #include "view_servo/control/course.h"
@@ -42,11 +43,8 @@ struct HomingParams
   double lost_timeout = 10.0;  ///< homing gives up after this time without a sign of the view [s]
 
   // Mode SERVO.
-  double gain = 1.0;                   ///< speed per distance of the view [1/s]
-  double turn_gain = 1.0;              ///< turn rate per yaw error [1/s]
+  ApproachParams approach;
   double blind_speed = 0.1;            ///< speed while only the heading is known [m/s]
-  double distance_tolerance = 0.002;   ///< distance from the view at which the base has arrived [m]
-  double yaw_tolerance = 0.002;        ///< yaw error at which it has arrived [rad]
   double dwell = 0.5;                  ///< time that the base has to stay within both tolerances [s]
   double arrival_distance = 0.01;      ///< within it the view counts as reached, though the base still drives [m]
   double arrival_yaw = 0.0175;         ///< yaw error within which the view counts as reached [rad]
@@ -81,8 +79,9 @@ struct HomingReport
 {
   double stamp = 0.0;  ///< of the last image [s]
   HomingState state = HomingState::ACQUIRING;
-  std::string reason;    ///< of the state, in one line
-  bool at_view = false;  ///< within arrival_distance and arrival_yaw, and the image looks like it
+  std::string reason;     ///< of the state, in one line
+  std::string manoeuvre;  ///< what a base that cannot slide does at the moment; empty: nothing worth a word
+  bool at_view = false;   ///< within arrival_distance and arrival_yaw, and the image looks like it
   /** Direction to the view's base pose in base_link, positive to the left [rad]. */
   double heading = std::numeric_limits<double>::quiet_NaN();
   double yaw_error = std::numeric_limits<double>::quiet_NaN();  ///< angle left to turn, positive to the left [rad]
@@ -121,8 +120,7 @@ struct HomingTarget
 };
 
 /**
- * Brings a holonomic base back to where a view was stored, from what is matched in the camera's images and from its
- * odometry. Knows no ROS; times are those of the images [s] and may run at any speed, but not back.
+ * Brings a base back to where a view was stored, from what is matched in the camera's images and from its odometry. Knows no ROS; times are those of the images [s] and may run at any speed, but not back.
  */
 class Homing
 {

@@ -99,6 +99,13 @@ public:
    */
   Result track(const cv::Mat& current, const PlanarPose& predicted) const;
 
+  /**
+   * The share of the view, [0, 1], that is in the image, and not of another size than can be matched, when the stored
+   * view's level camera is at a pose in the current one: of the landmarks, but no more than of the whole stored view
+   * after the turn alone. Without landmarks: of points all over the stored view, params.assumed_depth away.
+   */
+  double shareInSight(const PlanarPose& view_in_camera) const;
+
   /** The pose from matches (level points) of landmarks, without a prediction. */
   Result locate(const Correspondences& matches) const;
 
