@@ -4,6 +4,7 @@
 #include "view_servo/HomeToViewAction.h"
 #include "view_servo/LineMatches.h"
 #include "view_servo/PointMatches.h"
+#include "view_servo/control/motion_watch.h"
 #include "view_servo/parameters/error_text.h"
 #include "view_servo/ros/base_conversions.h"
 #include "view_servo/ros/base_output.h"
@@ -33,7 +34,7 @@ namespace view_servo
 {
 
 /**
- * Drives a holonomic mobile base back to where a view was stored. Private parameters: see HomingDriverParams.
+ * Drives a mobile base back to where a view was stored. Private parameters: see HomingDriverParams.
  *
  * Subscribes:
  *  - `image_raw`, `camera_info`: see CameraInput;
@@ -164,8 +165,9 @@ public:
     return base_in_odom_ && odd_stamps_ == 0 ? along(course_, *base_in_odom_) : Velocity(Velocity::Zero());
   }
 
-  static void sent(double /*time*/, const Velocity& /*velocity*/)
+  void sent(double time, const Velocity& velocity)
   {
+    motion_.addCommand(time, velocity);
   }
   static void onMissingInput(double /*time*/, const std::string& /*why*/)
   {
@@ -207,6 +209,7 @@ public:
   void fill(HomeToViewFeedback& feedback, const ServoStatus& /*status*/) const
   {
     feedback.heading = toHeading(report_, params_.base_frame);
+    feedback.manoeuvre = report_.manoeuvre;
   }
 
   void diagnose(diagnostic_updater::DiagnosticStatusWrapper& status) const
@@ -243,6 +246,7 @@ private:
     course_ = Course();
     unanswered_.reset();
     odd_stamps_ = 0;
+    motion_.clear();
     worker_.setTask(task_);
   }
 
@@ -317,6 +321,10 @@ private:
     {
       travelled_ += base_in_odom_ ? compose(inverse(*base_in_odom_), reading->pose).distance() : 0.0;
       base_in_odom_ = reading->pose;
+      if (const std::string fault = motion_.addOdometry(ros::Time::now().toSec(), reading->pose); !fault.empty())
+      {
+        context_.abort(fault);
+      }
     }
   }
 
@@ -411,6 +419,7 @@ private:
   HomingReport report_;
   Course course_;
   std::optional<PlanarPose> base_in_odom_;
+  MotionWatch motion_;
   double travelled_ = 0.0;
   int odd_stamps_ = 0;
   std::optional<Clock::time_point>

@@ -28,12 +28,13 @@ class FakeArm : public FakeRobot
 public:
   using Action = ServoToViewAction;
   using Command = geometry_msgs::TwistStamped;
+  static constexpr const char* NAMESPACE = "driving";
   static constexpr const char* DRIVER = "servo_25d";
   static constexpr const char* ACTION = "servo";
   static constexpr const char* SILENT = "no homograph";
-  static std::string path()
+  static std::vector<std::string> program()
   {
-    return SERVO_25D_PATH;
+    return { SERVO_25D_PATH };
   }
 
   explicit FakeArm(const std::string& ns) : FakeRobot(ns, DRIVER)

@@ -7,7 +7,9 @@
 #include <ros/node_handle.h>
 #include <ros/subscriber.h>
 
+#include <algorithm>
 #include <chrono>
+#include <functional>
 #include <mutex>
 #include <string>
 #include <vector>
@@ -50,6 +52,11 @@ public:
     const std::lock_guard<std::mutex> lock(mutex_);
     return !list_.empty();
   }
+  bool all(const std::function<bool(const Message&)>& predicate) const
+  {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    return std::all_of(list_.begin(), list_.end(), [&](const Command& command) { return predicate(command.message); });
+  }
   /** When the last one came that moves the robot, since a moment [s]; negative: none did. */
   double lastMotionAfter(Clock::time_point moment) const
   {
@@ -72,6 +79,13 @@ public:
   {
     const std::lock_guard<std::mutex> lock(mutex_);
     return list_.back().message;
+  }
+
+  /** The newest one; one that moves nothing when there is none. */
+  Message newest() const
+  {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    return list_.empty() ? Message() : list_.back().message;
   }
 
   /** Does not listen any more. */

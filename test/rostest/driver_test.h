@@ -76,6 +76,12 @@ public:
     return wanted_;
   }
 
+  /** What the robot is told. By default it stands still, whatever that is. */
+  template <typename Message>
+  void obey(const CommandsOf<Message>& /*commands*/)
+  {
+  }
+
   std::atomic<bool> answers{ true };  // what matches or follows the view publishes
   std::atomic<bool> camera{ true };   // publishes
   std::atomic<bool> calibrated{ true };
@@ -152,7 +158,8 @@ private:
 /**
  * A driver with a robot that the test plays. `Robot` is a FakeRobot with
  *  - `Action`, `Command`, and the names DRIVER (node), ACTION, SILENT (words about a peer that does not answer);
- *  - a constructor (ns); `static std::string path()` of the driver's program;
+ *  - a constructor (ns); the NAMESPACE of the driver that is running;
+ *  - `static std::vector<std::string> program()`: how another one is started;
  *  - `void publishExtremes()`: messages on every input, with everything in them that can be wrong.
  */
 template <typename Robot>
@@ -167,16 +174,17 @@ protected:
   using Commands = CommandsOf<typename Robot::Command>;
   using GoalState = actionlib::SimpleClientGoalState;
 
-  DriverTest() : DriverTest("driving", "cmd_vel")
+  DriverTest() : DriverTest(Robot::NAMESPACE, "cmd_vel")
   {
   }
   DriverTest(const std::string& ns, const std::string& command_topic)
     : ns_(ns),
-      robot_(ns),
       commands_(ns + "/" + command_topic),
+      robot_(ns),
       status_(ns + "/status"),
       client_(ns + "/" + Robot::ACTION, false)
   {
+    robot_.obey(commands_);
   }
 
   void SetUp() override
@@ -289,12 +297,20 @@ protected:
   struct OtherDriver
   {
     explicit OtherDriver(const std::string& views_dir)
-      : robot("ending"),
-        commands("ending/cmd_vel"),
+      : commands("ending/cmd_vel"),
+        robot("ending"),
         status("ending/status"),
         client(std::string("ending/") + Robot::ACTION, false),
-        node({ Robot::path(), "__ns:=ending", "_views_dir:=" + views_dir }, directory.path() / "output")
+        node(commandOf(views_dir), directory.path() / "output")
     {
+      robot.obey(commands);
+    }
+
+    static std::vector<std::string> commandOf(const std::string& views_dir)
+    {
+      std::vector<std::string> words = Robot::program();
+      words.insert(words.end(), { "__ns:=ending", "_views_dir:=" + views_dir });
+      return words;
     }
 
     void send(const std::string& view)
@@ -326,8 +342,8 @@ protected:
     }
 
     const TemporaryDirectory directory;
-    Robot robot;
     Commands commands;
+    Robot robot;
     Recorder<ServoStatus> status;
     Client client;
     ChildProcess node;
@@ -339,8 +355,8 @@ protected:
   }
 
   std::string ns_;
-  Robot robot_;
   Commands commands_;
+  Robot robot_;
   Recorder<ServoStatus> status_;
   Client client_;
 };

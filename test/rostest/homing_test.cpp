@@ -58,18 +58,19 @@ const Scene& scene()
   return made;
 }
 
-/** A base that stands still, whatever it is told, with a camera and a matcher. */
+/** A base on a stand, with a camera and a matcher: its wheels turn as they are told, what it sees does not change. */
 class FakeBase : public FakeRobot
 {
 public:
   using Action = HomeToViewAction;
   using Command = geometry_msgs::Twist;
+  static constexpr const char* NAMESPACE = "driving";
   static constexpr const char* DRIVER = "homing";
   static constexpr const char* ACTION = "home";
   static constexpr const char* SILENT = "no matches";
-  static std::string path()
+  static std::vector<std::string> program()
   {
-    return HOMING_PATH;
+    return { HOMING_PATH };
   }
 
   explicit FakeBase(const std::string& ns) : FakeRobot(ns, DRIVER)
@@ -82,11 +83,17 @@ public:
     focal_length = scene().world.camera.k(0, 0);
     broadcaster_.sendTransform(
         sim::toTransform(scene().world.camera_on_base, sim::BASE_FRAME, sim::CAMERA_FRAME, ros::Time::now()));
-    start(50.0, [this](int cycle) { publish(cycle); });
+    start(RATE, [this](int cycle) { publish(cycle); });
   }
   ~FakeBase() override
   {
     stop();
+  }
+
+  void obey(const CommandsOf<Command>& commands)
+  {
+    const std::lock_guard<std::mutex> lock(publisher_mutex_);
+    commands_ = &commands;
   }
 
   /** The matcher goes, with all its connections, and comes back. */
@@ -159,13 +166,21 @@ public:
   std::atomic<bool> moves_odometry{ true };    // publishes it
   std::atomic<double> odometry_offset{ 0.0 };  // of its stamps against the images' [s]
   std::atomic<bool> black{ false };
+  std::atomic<bool> blocked{ false };  // its wheels do not turn
 
 private:
+  static constexpr double RATE = 50.0;  // of odometry [Hz]
+
   void publish(int cycle)
   {
     constexpr int IMAGE_EVERY = 5;
     const ros::Time time = stamp();
     const std::lock_guard<std::mutex> lock(publisher_mutex_);
+    if (commands_ != nullptr && !blocked)
+    {
+      const Command told = commands_->newest();
+      base_ = compose(base_, { told.linear.x / RATE, told.linear.y / RATE, told.angular.z / RATE });
+    }
     if (moves_odometry)
     {
       const double late = !shuffles ? 0.0 : cycle % 20 == 0 ? 0.8 : cycle % 3 == 0 ? 0.05 : 0.0;
@@ -214,18 +229,19 @@ private:
     return message;
   }
 
-  static nav_msgs::Odometry odometry(const ros::Time& time)
+  nav_msgs::Odometry odometry(const ros::Time& time) const
   {
     nav_msgs::Odometry message;
     message.header.stamp = time;
     message.header.frame_id = sim::ODOM_FRAME;
     message.child_frame_id = sim::BASE_FRAME;
-    const PlanarPose& base = scene().base;
-    message.pose.pose = sim::toPose(sim::planarPose(base.x, base.y, base.yaw));
+    message.pose.pose = sim::toPose(sim::planarPose(base_.x, base_.y, base_.yaw));
     return message;
   }
 
   std::mutex publisher_mutex_;
+  const CommandsOf<Command>* commands_ = nullptr;
+  PlanarPose base_ = scene().base;  // by odometry
   std::string odometry_child_ = sim::BASE_FRAME;
   std::string camera_frame_ = sim::CAMERA_FRAME;
   ros::Publisher images_;
@@ -236,7 +252,20 @@ private:
   tf2_ros::StaticTransformBroadcaster broadcaster_;
 };
 
+/** The same base, whose driver takes it for one that cannot slide. */
+class FakeDifferentialBase final : public FakeBase
+{
+public:
+  using FakeBase::FakeBase;
+  static constexpr const char* NAMESPACE = "differential";
+  static std::vector<std::string> program()
+  {
+    return { HOMING_PATH, "_base:=differential" };
+  }
+};
+
 INSTANTIATE_TYPED_TEST_SUITE_P(Homing, DriverCases, FakeBase);
+INSTANTIATE_TYPED_TEST_SUITE_P(HomingDifferential, DriverCases, FakeDifferentialBase);
 
 class HomingTest : public DriverTest<FakeBase>
 {
@@ -368,6 +397,17 @@ TEST_F(HomingTest, SaysThatImagesHaveNoFrame)
   EXPECT_FALSE(commands_.moving());
 }
 
+TEST_F(HomingTest, EndsWhenTheBaseDoesNotDoWhatItIsTold)
+{
+  drive();
+  const Clock::time_point moment = Clock::now();
+  robot_.blocked = true;
+  const auto final = result();
+  EXPECT_FALSE(final.success);
+  EXPECT_NE(final.message.find("the base does not do what it is told"), std::string::npos) << final.message;
+  EXPECT_LT(commands_.lastMotionAfter(moment), 2.0 + STOPS_WITHIN);
+}
+
 TEST_F(HomingTest, StopsWhenTheImageTurnsBlackAndGoesOnAfterwards)
 {
   drive();
@@ -400,6 +440,18 @@ TEST_F(HomingTest, RefusesAStepThatIsNone)
   EXPECT_TRUE(std::isnan(final.final.heading));
   send("");
   EXPECT_NE(result().message.find("names no view"), std::string::npos);
+}
+
+class DifferentialHomingTest : public DriverTest<FakeDifferentialBase>
+{
+};
+
+TEST_F(DifferentialHomingTest, NeverSlidesAndSaysWhatItDoes)
+{
+  const Recorder<HomeToViewActionFeedback> feedback(ns_ + "/home/feedback");
+  drive();
+  EXPECT_TRUE(waitUntil([&] { return feedback.last() && !feedback.last()->feedback.manoeuvre.empty(); }));
+  EXPECT_TRUE(commands_.all([](const geometry_msgs::Twist& twist) { return twist.linear.y == 0.0; }));
 }
 
 class DryHomingTest : public DriverTest<FakeBase>

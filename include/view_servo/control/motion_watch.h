@@ -1,0 +1,55 @@
+// Copyright (c) 2026, the view_servo authors
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include "view_servo/control/velocity_limiter.h"
+#include "view_servo/geometry/planar_pose.h"
+
+#include <deque>
+#include <string>
+
+namespace view_servo
+{
+/**
+ * Compares what a base is told with what its odometry says that it does. Knows no ROS; times are by one clock that does
+ * not go back [s].
+ */
+class MotionWatch
+{
+public:
+  /** A command has been sent, to be followed until the next one. */
+  void addCommand(double time, const BaseVelocity& velocity);
+
+  /**
+   * Odometry has come.
+   * @return one sentence where both have disagreed for WINDOW: that the base does not move, moves otherwise or the other
+   * way round. Empty while they agree, and while the base is told to stand.
+   */
+  std::string addOdometry(double time, const PlanarPose& base_in_odom);
+
+  /** Forgets what it knows. */
+  void clear()
+  {
+    moments_.clear();
+    command_ = BaseVelocity::Zero();
+  }
+
+private:
+  static constexpr double WINDOW = 2.0;  // [s]
+
+  struct Moment
+  {
+    double time;            // [s]
+    PlanarPose in_odom;     // of the base
+    PlanarPose by_command;  // where it would be by the commands alone
+  };
+
+  void advance(double time);
+
+  BaseVelocity command_ = BaseVelocity::Zero();
+  double time_ = 0.0;  // to which by_command_ leads [s]
+  PlanarPose by_command_;
+  std::deque<Moment> moments_;  // while the base has been told to move all the time
+};
+
+}  // namespace view_servo
