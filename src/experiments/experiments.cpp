@@ -62,6 +62,8 @@ const std::vector<Experiment>& experiments()
     { "lines_table", "tables 4.1 and 4.2: line matching by pairs and triplets", true, std::nullopt,
       runLinesTableExperiment },
     { "homing", "chapter 5: homing in simulated rooms, from many starts", false, HOMING_STARTS, runHomingExperiment },
+    { "homing_differential", "the same for a base that cannot slide", false, HOMING_STARTS,
+      runHomingDifferentialExperiment },
     { "arm", "table 8.1: servoing of a simulated arm, from many starts", false, ARM_RUNS, runArmExperiment },
     { "homing_directions", "the heading between real views of a room", true, DIRECTION_DRAWS, runDirectionsExperiment },
     { "multi_hypothesis", "table 9.1, figures 9.1 to 9.6: several hypotheses a point, simulated", false,

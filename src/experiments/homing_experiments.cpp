@@ -45,6 +45,7 @@ constexpr double DEGREES = 180.0 / M_PI;
 struct Run
 {
   std::string world;
+  BaseKind base;
   HomingMode mode;
   bool hard;
   int index;  ///< of the start; 0: the thesis' one
@@ -56,6 +57,13 @@ sim::HomingTrialParams paramsOf(const Run& run)
 {
   sim::HomingTrialParams params;
   params.seed = run.seed;
+  params.homing.approach.base = run.base;
+  if (run.hard && run.base == BaseKind::DIFFERENTIAL)
+  {
+    params.conditions.odometry_turn_scale = 1.2;
+    params.conditions.deadband_speed = 0.01;
+    params.conditions.deadband_turn_rate = 0.04;
+  }
   if (run.hard)
   {
     params.conditions.image_noise = 5.0;
@@ -84,7 +92,8 @@ std::string toRow(const Run& run, const sim::HomingOutcome& outcome)
       << (run.hard ? "hard" : "plain") << ',' << run.index << ',' << run.start.x << ',' << run.start.y << ','
       << run.start.yaw * DEGREES << ',' << (outcome.arrived ? 1 : 0) << ',' << 1e3 * outcome.distance_error << ','
       << 1e3 * outcome.ahead_error << ',' << 1e3 * outcome.side_error << ',' << outcome.yaw_error * DEGREES << ','
-      << outcome.duration << ',' << outcome.travelled << ',' << reason << '\n';
+      << outcome.duration << ',' << outcome.travelled << ',' << outcome.reversals << ',' << outcome.in_sight << ','
+      << reason << '\n';
   return row.str();
 }
 
@@ -92,7 +101,8 @@ std::string toRow(const Run& run, const sim::HomingOutcome& outcome)
 class Summary
 {
 public:
-  void add(const sim::HomingOutcome& outcome)
+  /** @param distance from the start to the goal [m]. */
+  void add(const sim::HomingOutcome& outcome, double distance)
   {
     constexpr double NEAR_ENOUGH = 0.02;            // [m]
     constexpr double STRAIGHT_ENOUGH = M_PI / 180;  // [rad]
@@ -101,6 +111,9 @@ public:
     millimetres_.push_back(1e3 * outcome.distance_error);
     degrees_.push_back(std::abs(outcome.yaw_error) * DEGREES);
     seconds_.push_back(outcome.duration);
+    reversals_.push_back(outcome.reversals);
+    ways_.push_back(outcome.travelled / distance);
+    in_sight_.push_back(outcome.in_sight);
   }
 
   void print(std::ostream& stream) const
@@ -108,8 +121,11 @@ public:
     stream << good_ << " of " << millimetres_.size() << " random starts end within 2 cm and 1 degree, " << arrived_
            << " say so; distance: median " << median(millimetres_) << ", 95 % " << percentile(millimetres_, 0.95)
            << ", largest " << percentile(millimetres_, 1.0) << " mm; yaw: median " << median(degrees_) << ", largest "
-           << percentile(degrees_, 1.0) << " degrees; time: median " << median(seconds_) << ", longest "
-           << percentile(seconds_, 1.0) << " s" << std::endl;
+           << percentile(degrees_, 1.0) << " degrees; time: median " << median(seconds_) << ", 95 % "
+           << percentile(seconds_, 0.95) << ", longest " << percentile(seconds_, 1.0) << " s; reversals: median "
+           << median(reversals_) << ", most " << percentile(reversals_, 1.0) << "; way: median " << median(ways_)
+           << " of the straight one; the view in sight in " << 100.0 * median(in_sight_)
+           << " % of the images in the median" << std::endl;
   }
 
 private:
@@ -118,62 +134,63 @@ private:
   std::vector<double> millimetres_;
   std::vector<double> degrees_;
   std::vector<double> seconds_;
+  std::vector<double> reversals_;
+  std::vector<double> ways_;  // as parts of the straight one
+  std::vector<double> in_sight_;
 };
 
-std::vector<Run> allRuns(const std::map<std::string, sim::World>& worlds, const ExperimentContext& context)
+using Worlds = std::map<std::string, sim::World>;
+
+Worlds readWorlds()
+{
+  Worlds worlds;
+  for (const char* name : { "desk", "cabinet", "corridor" })
+  {
+    worlds.emplace(name, sim::findWorld(name, packageFolder() / "config" / "worlds"));
+  }
+  return worlds;
+}
+
+/** Runs from random starts under both conditions. @param max_yaw by which starts are turned at most [rad]. */
+std::vector<Run> randomRuns(const Worlds& worlds, BaseKind base, double max_yaw, const ExperimentContext& context)
 {
   std::vector<Run> runs;
-  const auto add = [&](const std::string& world, HomingMode mode, bool hard, int index, const PlanarPose& start) {
-    const std::uint64_t seed = context.seedOf(HOMING_STARTS, static_cast<std::uint64_t>(index) + 1);
-    runs.push_back({ world, mode, hard, index, start, seed });
-  };
-  for (const char* name : { "desk", "cabinet" })
-  {
-    const PlanarPose start = context.brief ? PlanarPose{ -0.1, 0.05, 0.0 } : toPlanar(worlds.at(name).start("thesis"));
-    add(name, HomingMode::THESIS, false, 0, start);
-    add(name, HomingMode::SERVO, false, 0, start);
-  }
   Rng rng(context.seedOf(HOMING_STARTS, HOMING_STARTS.seed));
   const std::array<const char*, 3> names = { "desk", "cabinet", "corridor" };
   for (int i = 0; i < context.runsOf(HOMING_STARTS); ++i)
   {
     const std::string name = names[static_cast<std::size_t>(i) % names.size()];
-    const PlanarPose start = sim::randomStart(worlds.at(name), rng);
+    const PlanarPose start = sim::randomStart(worlds.at(name), rng, max_yaw);
+    const std::uint64_t seed = context.seedOf(HOMING_STARTS, static_cast<std::uint64_t>(i) + 2);
     for (const bool hard : { false, true })
     {
-      add(name, HomingMode::SERVO, hard, i + 1, start);
+      runs.push_back({ name, base, HomingMode::SERVO, hard, i + 1, start, seed });
     }
   }
   return runs;
 }
 
-}  // namespace
-
-void runHomingExperiment(const ExperimentContext& context, std::ostream& csv)
+/** Does all runs, and writes what came of each. */
+void home(const std::vector<Run>& runs, const Worlds& worlds, const ExperimentContext& context, std::ostream& csv)
 {
-  std::map<std::string, sim::World> worlds;
-  for (const char* name : { "desk", "cabinet", "corridor" })
-  {
-    worlds.emplace(name, sim::findWorld(name, packageFolder() / "config" / "worlds"));
-  }
-  const std::vector<Run> runs = allRuns(worlds, context);
   std::vector<std::string> rows(runs.size());
   std::map<std::string, Summary> summaries;  // of conditions
   std::mutex mutex;
   std::size_t done = 0;
   inParallel(runs.size(), context.threads, [&](std::size_t i) {
-    sim::HomingTrials trials(worlds.at(runs[i].world), paramsOf(runs[i]));
-    const sim::HomingOutcome outcome = trials.run(runs[i].start);
+    const sim::World& world = worlds.at(runs[i].world);
+    const sim::HomingOutcome outcome = sim::HomingTrials(world, paramsOf(runs[i])).run(runs[i].start);
+    const double distance = compose(inverse(toPlanar(world.goal)), runs[i].start).distance();
     const std::lock_guard<std::mutex> lock(mutex);
     rows[i] = toRow(runs[i], outcome);
     std::cerr << ++done << " of " << runs.size() << ": " << rows[i] << std::flush;
     if (runs[i].index > 0)
     {
-      summaries[runs[i].hard ? "hard" : "plain"].add(outcome);
+      summaries[runs[i].hard ? "hard" : "plain"].add(outcome, distance);
     }
   });
   csv << "world,mode,conditions,index,start_x,start_y,start_yaw_deg,arrived,distance_error_mm,ahead_mm,side_mm,"
-         "yaw_error_deg,duration_s,travelled_m,reason\n";
+         "yaw_error_deg,duration_s,travelled_m,reversals,in_sight,reason\n";
   for (const std::string& row : rows)
   {
     csv << row;
@@ -183,6 +200,33 @@ void runHomingExperiment(const ExperimentContext& context, std::ostream& csv)
     std::cout << conditions << ": ";
     summary.print(std::cout);
   }
+}
+
+}  // namespace
+
+void runHomingExperiment(const ExperimentContext& context, std::ostream& csv)
+{
+  constexpr double MAX_YAW = M_PI / 18.0;
+  const Worlds worlds = readWorlds();
+  std::vector<Run> runs;
+  for (const char* name : { "desk", "cabinet" })
+  {
+    const PlanarPose start = context.brief ? PlanarPose{ -0.1, 0.05, 0.0 } : toPlanar(worlds.at(name).start("thesis"));
+    for (const HomingMode mode : { HomingMode::THESIS, HomingMode::SERVO })
+    {
+      runs.push_back({ name, BaseKind::HOLONOMIC, mode, false, 0, start, context.seedOf(HOMING_STARTS, 1) });
+    }
+  }
+  const std::vector<Run> random = randomRuns(worlds, BaseKind::HOLONOMIC, MAX_YAW, context);
+  runs.insert(runs.end(), random.begin(), random.end());
+  home(runs, worlds, context, csv);
+}
+
+void runHomingDifferentialExperiment(const ExperimentContext& context, std::ostream& csv)
+{
+  constexpr double MAX_YAW = M_PI / 9.0;
+  const Worlds worlds = readWorlds();
+  home(randomRuns(worlds, BaseKind::DIFFERENTIAL, MAX_YAW, context), worlds, context, csv);
 }
 
 namespace

@@ -43,6 +43,11 @@ std::vector<Parameter> parameters(NomadParams& params)
     real("max_acceleration", params.max_acceleration, "m/s^2", "> 0", "largest change of the velocity"),
     real("max_turn_acceleration", params.max_turn_acceleration, "rad/s^2", "> 0", "largest change of the turn rate"),
     real("radius", params.radius, "m", "> 0", "radius of the outline on the floor"),
+    choice<bool>("base", params.differential, { { "holonomic", false }, { "differential", true } },
+                 "a differential one cannot slide: it does not carry out velocities to the side"),
+    real("deadband_speed", params.deadband_speed, "m/s", ">= 0", "slower commands do not move it"),
+    real("deadband_turn_rate", params.deadband_turn_rate, "rad/s", ">= 0", "slower commands do not turn it"),
+    real("odometry_turn_scale", params.odometry_turn_scale, "", "> 0", "turn that odometry measures by the true one"),
     real("odometry_drift", params.odometry_drift, "", "> -1", "distance measured too long, as a part of it"),
     real("odometry_turn_drift", params.odometry_turn_drift, "rad/m", "", "turn that odometry adds to a distance"),
     real("odometry_noise", params.odometry_noise, "", ">= 0",
@@ -98,6 +103,18 @@ bool Nomad::command(const Velocity& velocity)
   }
   commanded_.head<2>() = limited(velocity.head<2>(), params_.max_speed);
   commanded_.z() = std::clamp(velocity.z(), -params_.max_turn_rate, params_.max_turn_rate);
+  if (params_.differential)
+  {
+    commanded_.y() = 0.0;
+  }
+  if (commanded_.head<2>().norm() < params_.deadband_speed)
+  {
+    commanded_.head<2>().setZero();
+  }
+  if (std::abs(commanded_.z()) < params_.deadband_turn_rate)
+  {
+    commanded_.z() = 0.0;
+  }
   return true;
 }
 
@@ -126,7 +143,7 @@ void Nomad::step(double dt)
   };
   const double distance = motion.head<2>().norm();
   const double scale = (1.0 + params_.odometry_drift) * noise();
-  const double turned = motion.z() * noise() + params_.odometry_turn_drift * distance;
+  const double turned = params_.odometry_turn_scale * motion.z() * noise() + params_.odometry_turn_drift * distance;
   const Eigen::Vector3d measured(scale * motion.x(), scale * motion.y(), turned);
   odometry_ = moved(odometry_, measured);
   measured_ = measured / dt;

@@ -18,12 +18,16 @@ namespace view_servo::sim
 /** Options of the simulated base. */
 struct NomadParams
 {
+  bool differential = false;           ///< it cannot slide: a velocity to the side is not carried out
   double max_speed = 0.5;              ///< [m/s]
   double max_turn_rate = 1.0;          ///< [rad/s]
   double max_acceleration = 1.0;       ///< [m/s²]
   double max_turn_acceleration = 2.0;  ///< [rad/s²]
   double radius = 0.26;                ///< of its round outline on the floor [m]
   double odometry_drift = 0.0;         ///< by which part it measures distances too long
+  double odometry_turn_scale = 1.0;    ///< by which factor it measures turns too large, as where wheels skid
+  double deadband_speed = 0.0;         ///< slower commands do not move it [m/s]
+  double deadband_turn_rate = 0.0;     ///< slower commands do not turn it [rad/s]
   double odometry_turn_drift = 0.0;    ///< turn that it measures and that does not happen [rad/m]
   double odometry_noise = 0.0;         ///< standard deviation of measured motion, as a part of it
   std::uint64_t seed = 1;              ///< of odometry's noise
@@ -36,8 +40,8 @@ struct NomadParams
 std::vector<Parameter> parameters(NomadParams& params);
 
 /**
- * A holonomic base like the Nomad 200, which moves in any direction without turning and turns without moving. Its poses
- * lie on the floor.
+ * A base. By default it is holonomic like the Nomad 200, which moves in any direction without turning and turns without
+ * moving. Its poses lie on the floor.
  */
 class Nomad
 {

@@ -26,6 +26,7 @@ constexpr double STEP = 0.005;            // of the simulation [s]
 constexpr double ODOMETRY_PERIOD = 0.02;  // [s]
 constexpr double CONTROL_PERIOD = 0.05;   // [s]
 constexpr double IMAGE_DELAY = 0.05;      // from an image's stamp until homing gets it [s]
+constexpr double MOVES = 0.005;           // slower, a base counts as one that stands [m/s]
 constexpr double SETTLING = 1.0;          // from the end of homing until the error is measured [s]
 
 /**
@@ -123,7 +124,11 @@ struct StampedImage
 Nomad nomadAt(const World& world, const HomingTrialParams& params, const PlanarPose& start)
 {
   NomadParams nomad_params;
+  nomad_params.differential = params.homing.approach.base == BaseKind::DIFFERENTIAL;
   nomad_params.odometry_drift = params.conditions.odometry_drift;
+  nomad_params.odometry_turn_scale = params.conditions.odometry_turn_scale;
+  nomad_params.deadband_speed = params.conditions.deadband_speed;
+  nomad_params.deadband_turn_rate = params.conditions.deadband_turn_rate;
   nomad_params.seed = params.seed;
   Nomad nomad(world, nomad_params);
   nomad.setPose(planarPose(start.x, start.y, start.yaw));
@@ -228,6 +233,10 @@ private:
     if (const std::optional<StampedImage> ready = images_.take(time_))
     {
       homing_->addImage(ready->stamp, ready->image);
+      const HomingState state = homing_->report().state;
+      found_ = found_ || state != HomingState::ACQUIRING;
+      images_since_found_ += found_ ? 1 : 0;
+      images_in_sight_ += found_ && state != HomingState::LOST ? 1 : 0;
       if (on_step_)
       {
         on_step_({ time_, toPlanar(nomad_.pose()), homing_->report(), nomad_.velocity() });
@@ -258,6 +267,12 @@ private:
     nomad_.step(STEP);
     const PlanarPose here = toPlanar(nomad_.pose());
     travelled_ += std::hypot(here.x - last_.x, here.y - last_.y);
+    const double ahead = nomad_.velocity().x();
+    if (std::abs(ahead) > MOVES)
+    {
+      reversals_ += ahead * sense_ < 0.0 ? 1 : 0;
+      sense_ = ahead;
+    }
     last_ = here;
   }
 
@@ -273,6 +288,8 @@ private:
     outcome.yaw_error = error.yaw;
     outcome.duration = end_ ? *end_ : time_;
     outcome.travelled = travelled_;
+    outcome.reversals = reversals_;
+    outcome.in_sight = images_since_found_ > 0 ? static_cast<double>(images_in_sight_) / images_since_found_ : 0.0;
     return outcome;
   }
 
@@ -292,6 +309,11 @@ private:
   Delayed<StampedMatches> matches_;
   PlanarPose last_;
   double travelled_ = 0.0;
+  double sense_ = 0.0;  // last speed ahead or back that was one [m/s]
+  int reversals_ = 0;
+  bool found_ = false;
+  int images_since_found_ = 0;
+  int images_in_sight_ = 0;
   std::optional<double> end_;  // when homing ended [s]
   double time_ = 0.0;          // [s]
 };
@@ -304,7 +326,7 @@ HomingOutcome HomingTrials::run(const PlanarPose& start, const std::function<voi
   return Run(world_, params_, *parts_, start, on_step).run();
 }
 
-PlanarPose randomStart(const World& world, Rng& rng)
+PlanarPose randomStart(const World& world, Rng& rng, double max_yaw)
 {
   constexpr double LEAST_SHARE = 0.3;
   Nomad nomad(world, NomadParams());
@@ -313,7 +335,7 @@ PlanarPose randomStart(const World& world, Rng& rng)
   {
     const double distance = uniform(rng, 0.4, 2.0);
     const double direction = uniform(rng, -M_PI / 3.0, M_PI / 3.0);
-    const double yaw = uniform(rng, -M_PI / 18.0, M_PI / 18.0);
+    const double yaw = uniform(rng, -max_yaw, max_yaw);
     const double sense = uniform(rng, 0.0, 1.0) < 0.5 ? 1.0 : -1.0;  // in front of the goal or behind it
     const PlanarPose start =
         compose(toPlanar(world.goal), { sense * distance * std::cos(direction), distance * std::sin(direction), yaw });

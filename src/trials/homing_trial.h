@@ -8,6 +8,7 @@
 #include "view_servo/control/velocity_limiter.h"
 #include "view_servo/geometry/planar_pose.h"
 
+#include <cmath>
 #include <cstdint>
 #include <functional>
 #include <memory>
@@ -19,12 +20,15 @@ namespace view_servo::sim
 /** What makes homing harder. The defaults add nothing. */
 struct HomingConditions
 {
-  double image_noise = -1.0;        ///< standard deviation [grey levels]; negative: the world's
-  double odometry_drift = 0.0;      ///< by which part distances are measured too long
-  double light_gain = 1.0;          ///< factor of the light under which the view was stored
-  double focal_length_error = 0.0;  ///< by which part the calibration has focal lengths too long
-  double occluded_from = -1.0;      ///< when a person begins to walk by, which takes 2 s [s]; negative: never
-  double odometry_delay = 0.0;      ///< by which odometry is stamped later than images of the same moment [s]
+  double image_noise = -1.0;         ///< standard deviation [grey levels]; negative: the world's
+  double odometry_drift = 0.0;       ///< by which part distances are measured too long
+  double light_gain = 1.0;           ///< factor of the light under which the view was stored
+  double focal_length_error = 0.0;   ///< by which part the calibration has focal lengths too long
+  double occluded_from = -1.0;       ///< when a person begins to walk by, which takes 2 s [s]; negative: never
+  double odometry_turn_scale = 1.0;  ///< turn that odometry measures by the true one
+  double deadband_speed = 0.0;       ///< slower commands do not move the base [m/s]
+  double deadband_turn_rate = 0.0;   ///< slower commands do not turn it [rad/s]
+  double odometry_delay = 0.0;       ///< by which odometry is stamped later than images of the same moment [s]
 };
 
 struct HomingTrialParams
@@ -61,6 +65,8 @@ struct HomingOutcome
   double yaw_error = 0.0;       ///< true one, at the end [rad]
   double duration = 0.0;        ///< until homing ended [s]
   double travelled = 0.0;       ///< length of the true path [m]
+  int reversals = 0;            ///< how often the base changed between driving ahead and back
+  double in_sight = 0.0;        ///< share of the images in which the view was found, once it had been found
 };
 
 /**
@@ -93,9 +99,9 @@ private:
 
 /**
  * A random start in the world: 0.4 to 2 m behind or in front of the goal, in a direction within 60 degrees of the
- * goal's axis, with the yaw off by up to 10 degrees, where the base can stand and at least 30 % of the stored view is
- * in sight.
+ * goal's axis, with the yaw off by up to `max_yaw` [rad], where the base can stand and at least 30 % of the stored view
+ * is in sight.
  */
-PlanarPose randomStart(const World& world, Rng& rng);
+PlanarPose randomStart(const World& world, Rng& rng, double max_yaw = M_PI / 18.0);
 
 }  // namespace view_servo::sim

@@ -69,9 +69,10 @@ TEST(Experiments, RefusesRunsWhereNothingIsRepeated)
     const Outcome outcome = run(name + " --runs 3");
     EXPECT_EQ(outcome.status, 2);
     expectContains(outcome.err, "--runs: " + name + " repeats nothing");
-    expectContains(outcome.err,
-                   "homing, arm, multi_hypothesis, real_pairs, profiles_parameters, view_consistency, "
-                   "false_answers, cyclic_order do");
+    expectContains(
+        outcome.err,
+        "homing, homing_differential, arm, multi_hypothesis, real_pairs, profiles_parameters, view_consistency, "
+        "false_answers, cyclic_order do");
   }
 }
 
