@@ -356,8 +356,9 @@ double ViewTracker::shareInSight(const PlanarPose& view_in_camera) const
   int by_motion = 0;
   for (int i = 0; i < COLUMNS * ROWS; ++i)
   {
-    const Eigen::Vector2d pixel((i % COLUMNS + 0.5) / COLUMNS * reference_.cols,
-                                (i / COLUMNS + 0.5) / ROWS * reference_.rows);
+    const int column = i % COLUMNS;
+    const int row = i / COLUMNS;
+    const Eigen::Vector2d pixel((column + 0.5) / COLUMNS * reference_.cols, (row + 0.5) / ROWS * reference_.rows);
     const Landmark point{ levelOf(pixel), 1.0 / params_.assumed_depth };
     by_turn += sees(point, turned) ? 1 : 0;
     by_motion += sees(point, view_in_camera) ? 1 : 0;
