@@ -32,7 +32,6 @@
 
 namespace view_servo
 {
-
 /**
  * Drives a mobile base back to where a view was stored. Private parameters: see HomingDriverParams.
  *
@@ -65,18 +64,19 @@ public:
 
   HomingDriver(DriverContext& context, const Params& params)
     : context_(context),
-      params_(withPlainFrame(params)),
+      params_(params),
+      base_frame_(withoutSlash(params.base_frame)),
       images_(context.addInput("image", context.quoted("image_raw"), params.image_timeout)),
       outcomes_(context.addInput("image that was worked on", context.quoted("image_raw"),
                                  OUTCOME_PATIENCE * params.image_timeout)),
-      odometry_(context, transforms_, params_.base_frame, params.odometry_timeout, params.odometry_delay,
+      odometry_(context, transforms_, base_frame_, params.odometry_timeout, params.odometry_delay,
                 [this](const nav_msgs::Odometry& message) { onOdometry(message); }),
       matches_(context.addInput("matches", context.quoted("point_matches") + " or " + context.quoted("line_matches"),
                                 params.match_timeout)),
       points_("matches", context.resolved("point_matches")),
       lines_("matches", context.resolved("line_matches")),
       store_(viewsDir(params.views_dir)),
-      output_(context.nodeHandle(), context.commandTopic(), params_.base_frame),
+      output_(context.nodeHandle(), context.commandTopic(), base_frame_),
       worker_(
           context.resolved("image_raw"),
           [this](const HomingOutcome& outcome) {
@@ -122,8 +122,7 @@ public:
     camera_.missing(before);
     context_.waitFor([&] { return camera_.missing(frame, before); });
     context_.waitFor([this] { return context_.locked([this] { return odometryLacks(); }); });
-    context_.waitFor(
-        [&] { return transforms_.missing(params_.base_frame, frame.image->header.frame_id, ros::Time(0)); });
+    context_.waitFor([&] { return transforms_.missing(base_frame_, frame.image->header.frame_id, ros::Time(0)); });
     HomingParams homing = params_.homing;
     if (goal.step > 0.0)
     {
@@ -202,13 +201,13 @@ public:
 
   void fill(HomeToViewResult& result) const
   {
-    result.final = toHeading(report_, params_.base_frame);
+    result.final = toHeading(report_, base_frame_);
     result.travelled = task_ ? travelled_ : 0.0;
   }
 
   void fill(HomeToViewFeedback& feedback, const ServoStatus& /*status*/) const
   {
-    feedback.heading = toHeading(report_, params_.base_frame);
+    feedback.heading = toHeading(report_, base_frame_);
     feedback.manoeuvre = report_.manoeuvre;
   }
 
@@ -225,12 +224,6 @@ public:
 
 private:
   using Clock = std::chrono::steady_clock;
-
-  static Params withPlainFrame(Params params)
-  {
-    params.base_frame = withoutSlash(params.base_frame);
-    return params;
-  }
 
   void want(const std::string& view, const std::string& goal)
   {
@@ -265,13 +258,9 @@ private:
   std::shared_ptr<HomingTask> makeTask(const StoredView& stored, const CameraFrame& frame,
                                        const HomingParams& params) const
   {
-    HomingTarget target;
-    target.image = stored.image;
-    target.camera = toCamera(*frame.info);
-    target.view_camera = cameraOf(stored, target.camera);
-    target.mount = CameraMount(
-        toIsometry(transforms_.lookUp(params_.base_frame, frame.image->header.frame_id, ros::Time(0), 0.0).transform));
-    return std::make_shared<HomingTask>(HomingTask{ stored.name, frame.info, makeHoming(params, target) });
+    const CameraMount mount(
+        toIsometry(transforms_.lookUp(base_frame_, frame.image->header.frame_id, ros::Time(0), 0.0).transform));
+    return makeHomingTask(stored, frame.info, mount, params);
   }
 
   // ------------------------------------------------------------------------------------------------------- inputs
@@ -405,6 +394,7 @@ private:
 
   DriverContext& context_;
   const Params params_;
+  const std::string base_frame_;
   DriverInput& images_;
   DriverInput& outcomes_;
   TransformSource transforms_;

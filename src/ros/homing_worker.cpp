@@ -8,6 +8,17 @@
 
 namespace view_servo
 {
+std::shared_ptr<HomingTask> makeHomingTask(const StoredView& stored, const sensor_msgs::CameraInfoConstPtr& info,
+                                           const CameraMount& mount, const HomingParams& params)
+{
+  HomingTarget target;
+  target.image = stored.image;
+  target.camera = toCamera(*info);
+  target.view_camera = cameraOf(stored, target.camera);
+  target.mount = mount;
+  return std::make_shared<HomingTask>(HomingTask{ stored.name, info, makeHoming(params, target) });
+}
+
 HomingWorker::HomingWorker(std::string image_topic, std::function<void(const HomingOutcome&)> on_outcome,
                            std::function<void(const CameraFrame&)> on_idle_frame)
   : image_topic_(std::move(image_topic)),

@@ -7,6 +7,7 @@
 #include "view_servo/control/homing.h"
 #include "view_servo/ros/camera_input.h"
 #include "view_servo/ros/worker.h"
+#include "view_servo/views/view_store.h"
 
 #include <sensor_msgs/CameraInfo.h>
 
@@ -27,6 +28,13 @@ struct HomingTask
   sensor_msgs::CameraInfoConstPtr info;  ///< calibration that `homing` was made with
   std::unique_ptr<Homing> homing;        ///< only the worker's thread uses it
 };
+
+/**
+ * @param info calibration of the images that homing will get. @param mount where their camera is on the base.
+ * @throws std::invalid_argument saying why homing to this view by such images cannot be.
+ */
+std::shared_ptr<HomingTask> makeHomingTask(const StoredView& stored, const sensor_msgs::CameraInfoConstPtr& info,
+                                           const CameraMount& mount, const HomingParams& params);
 
 /** The result of the images and matches that the worker took together. */
 struct HomingOutcome
