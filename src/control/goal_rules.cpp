@@ -69,6 +69,10 @@ Verdict judge(const Circumstances& circumstances, const Progress& progress)
     const bool given_up = circumstances.missing_for > circumstances.patience;
     return { given_up ? Verdict::ABORT : Verdict::STAND, circumstances.missing_input };
   }
+  if (prepared && !circumstances.held.empty())
+  {
+    return { Verdict::STAND, circumstances.held };
+  }
   return { progress.state == Progress::DRIVING ? Verdict::DRIVE : Verdict::STAND, reasonOf(progress) };
 }
 

@@ -100,7 +100,18 @@ std::vector<Row> table()
         c.elapsed = 61.0;
       },
       Progress::DRIVING, "drives", Verdict::ABORT, "not at the view within 60 s: no image" },
+    { "held", [](Circumstances& c) { c.held = "a person"; }, Progress::DRIVING, "drives", Verdict::STAND, "a person" },
+    { "held at the view", [](Circumstances& c) { c.held = "a person"; }, Progress::ARRIVED, "agree", Verdict::SUCCEED,
+      "agree" },
+    { "preparing, held", [](Circumstances& c) { c.held = "a person"; }, Progress::PREPARING, "no image yet",
+      Verdict::STAND, "no image yet" },
     // What counts first.
+    { "silent before held",
+      [](Circumstances& c) {
+        c.held = "a person";
+        c.missing_input = "no image";
+      },
+      Progress::DRIVING, "drives", Verdict::STAND, "no image" },
     { "ending before replaced", [](Circumstances& c) { c.shutting_down = c.replaced = true; }, Progress::DRIVING,
       "drives", Verdict::ABORT, "the node is shutting down" },
     { "replaced before cancelled", [](Circumstances& c) { c.replaced = c.cancelled = true; }, Progress::DRIVING,

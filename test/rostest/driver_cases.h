@@ -4,6 +4,8 @@
 
 #include "driver_test.h"
 
+#include <std_msgs/Bool.h>
+
 namespace view_servo
 {
 namespace test
@@ -214,6 +216,19 @@ TYPED_TEST_P(DriverCases, StopsWhenNobodyFollowsAnyMore)
   EXPECT_NE(final.message.find("nobody listens on"), std::string::npos) << final.message;
 }
 
+TYPED_TEST_P(DriverCases, StandsWhileItIsHeld)
+{
+  ros::Publisher stop = ros::NodeHandle(this->ns_).advertise<std_msgs::Bool>("stop", 1, true);
+  std_msgs::Bool message;
+  this->drive();
+  message.data = 1;
+  ASSERT_TRUE(waitUntil([&] { return stop.getNumSubscribers() > 0; }));
+  this->expectToStop([&] { stop.publish(message); }, ServoStatus::LOST, "held: the last word on");
+  message.data = 0;
+  stop.publish(message);
+  this->expectToGoOn();
+}
+
 TYPED_TEST_P(DriverCases, SurvivesWhateverIsInMessages)
 {
   this->robot_.publishExtremes();  // without a goal
@@ -265,8 +280,8 @@ REGISTER_TYPED_TEST_SUITE_P(DriverCases, WaitsForAPeerThatAnswersLate, EndsInTim
                             StopsWhenTheGoalIsCancelled, StopsForAnotherGoal, StopsBeforeItsProcessEnds, GivesUpInTime,
                             StopsWhenThePeerFallsSilentAndGoesOnWithIt, GivesUpWhenThePeerStaysSilent,
                             StopsWhenTimeGoesBack, StopsForStampsThatStandStill, StopsForStampsThatAreZero,
-                            StopsWhenTheCalibrationChanges, StopsWhenNobodyFollowsAnyMore, SurvivesWhateverIsInMessages,
-                            TakesManyGoalsWhilePeersComeAndGo);
+                            StopsWhenTheCalibrationChanges, StopsWhenNobodyFollowsAnyMore, StandsWhileItIsHeld,
+                            SurvivesWhateverIsInMessages, TakesManyGoalsWhilePeersComeAndGo);
 
 }  // namespace test
 }  // namespace view_servo

@@ -38,6 +38,7 @@ struct Circumstances
   double timeout = 0.0;        ///< time limit of the goal [s]
   std::string fault;  ///< why the driver's state cannot be trusted any more: time went back, an exception; empty: none
   std::string missing_input;  ///< which input does not come, and since when; empty: all come
+  std::string held;           ///< why the robot has to stand although all inputs come; empty: it need not
   double missing_for = 0.0;   ///< time since it last came [s]
   double patience = 0.0;      ///< a goal ends when an input is missing for longer than this [s]
 };
@@ -59,7 +60,8 @@ struct Verdict
 /**
  * Judges a goal. The first of these conditions that holds decides: the node ends, another goal has come, the driver's
  * state cannot be trusted, it is disabled, the goal is cancelled, the robot has arrived, the driver has given up, the
- * time is over, nobody listens, an input is missing. The last two do not matter while the goal is prepared.
+ * time is over, nobody listens, an input is missing, the robot is held. The last three do not matter while the goal is
+ * prepared.
  */
 Verdict judge(const Circumstances& circumstances, const Progress& progress);
 

@@ -11,6 +11,7 @@
 #include <actionlib/server/action_server.h>
 #include <diagnostic_msgs/DiagnosticStatus.h>
 #include <diagnostic_updater/DiagnosticStatusWrapper.h>
+#include <std_msgs/Bool.h>
 
 #include <atomic>
 #include <chrono>
@@ -34,7 +35,8 @@ namespace view_servo
  *
  * Publishes `~wanted_view` (view_servo/WantedView, latched), which matchers and trackers follow: nothing that moves a
  * robot waits for the answer of a service. `status` (view_servo/ServoStatus, latched); `/diagnostics`. Services:
- * `~enable` (std_srvs/SetBool). Action: Driver::ACTION.
+ * `~enable` (std_srvs/SetBool). Action: Driver::ACTION. Subscribes `stop` (std_msgs/Bool): after true the robot stands,
+ * and after false it goes on, for whatever else watches it.
  *
  * A goal exists from the moment it is accepted. A thread of the node prepares it, and may wait for that. In every cycle
  * of control, before the goal begins and after, judge() decides whether it goes on. However a goal ends, first zero is
@@ -111,6 +113,8 @@ private:
   using Velocity = typename Driver::Velocity;
   using Params = typename Driver::Params;
 
+  static constexpr const char* STOP_TOPIC = "stop";
+
   enum class Stage
   {
     ACCEPTED,
@@ -140,6 +144,8 @@ private:
       driver_(*this, params_)
   {
     start_patience_ = params_.node.start_patience;
+    listen<std_msgs::Bool>(STOP_TOPIC, 5,
+                           [this](const std_msgs::Bool::ConstPtr& message) { held_ = message->data != 0; });
     enable_service_ = serve("enable", &DriverNode::enable, this);
     diagnostics_.add(Driver::ACTION, this, &DriverNode::diagnose);
     status_.publish(idleStatus(gate_));
@@ -381,6 +387,7 @@ private:
     circumstances.fault = jump;
     circumstances.patience = params_.patience();
     circumstances.missing_input = runs ? missingInput() : "";
+    circumstances.held = held_ ? "held: the last word on " + quoted(STOP_TOPIC) + " is true" : "";
     if (circumstances.missing_input.empty())
     {
       missing_since_.reset();
@@ -428,7 +435,7 @@ private:
       }
       reportSent(now, Velocity::Zero());
     }
-    const bool lost = progress.state == Progress::LOST || !missing.empty();
+    const bool lost = progress.state == Progress::LOST || !missing.empty() || held_;
     publishProgress(lost ? ServoStatus::LOST : ServoStatus::ACQUIRING, reason);
   }
 
@@ -523,6 +530,7 @@ private:
   std::optional<Goal> goal_;  // ends before the server that its handle belongs to
   Driver driver_;
   ros::ServiceServer enable_service_;
+  bool held_ = false;  // by `stop`
   std::thread goal_thread_;
   ros::WallTimer control_timer_;
 };
