@@ -6,6 +6,8 @@
 #include "view_servo/geometry/fundamental.h"
 #include "view_servo/parameters/faults.h"
 
+#include <Eigen/Geometry>
+
 #include <algorithm>
 #include <cmath>
 #include <deque>
@@ -217,6 +219,7 @@ protected:
       if (tracker_.start(best.support, { distance * unit.x, distance * unit.y, unit.yaw }))
       {
         scale_ = 1.0;
+        scale_corrections_ = 0;
         trail_.clear();
         contradictions_ = 0;
         // Matches that hardly move tell no direction to follow, but where the points are.
@@ -262,6 +265,7 @@ protected:
         }
         const PlanarPose view = compose(camera, { scale_ * result.pose.x, scale_ * result.pose.y, result.pose.yaw });
         follow(stamp, averageAtRest(*base, view));
+        view_covariance_ = inOdometry(result, camera.yaw);
       }
     }
     if (view_in_odom_)
@@ -330,6 +334,16 @@ private:
     const PlanarPose& mean = *view_in_odom_;
     return { mean.x + part * (view.x - mean.x), mean.y + part * (view.y - mean.y),
              wrapAngle(mean.yaw + part * wrapAngle(view.yaw - mean.yaw)) };
+  }
+
+  /** The covariance of where the view is: that of its pose in the camera, and of the scale that odometry has given it. */
+  Eigen::Matrix3d inOdometry(const ViewTracker::Result& result, double camera_yaw) const
+  {
+    constexpr double SCALE_DOUBT = 0.05;  // wheels measure distances by some per cent wrong
+    const Eigen::DiagonalMatrix<double, 3> metres(scale_, scale_, 1.0);
+    const Eigen::Vector3d along(SCALE_DOUBT * scale_ * result.pose.x, SCALE_DOUBT * scale_ * result.pose.y, 0.0);
+    const Eigen::Matrix3d turned = Eigen::AngleAxisd(camera_yaw, Eigen::Vector3d::UnitZ()).toRotationMatrix();
+    return turned * (metres * result.covariance * metres + along * along.transpose()) * turned.transpose();
   }
 
   /** Whether a base that cannot slide goes on by odometry: its way may lead over where little of the view is in sight. */
@@ -445,6 +459,7 @@ private:
     {
       const double measured = std::clamp(by_odometry / by_view, scale_ / MAX_CHANGE, scale_ * MAX_CHANGE);
       scale_ = std::clamp(scale_ * std::pow(measured / scale_, WEIGHT), 1.0 / MAX_SCALE, MAX_SCALE);
+      ++scale_corrections_;
     }
   }
 
@@ -455,8 +470,9 @@ private:
     constexpr double ARRIVED_DISPLACEMENT = 1.5;  // of the view's points, in the median [px]
     constexpr double ARRIVED_CONFIDENCE = 0.75;   // share of the points that must be there
     constexpr double AT_VIEW_DISPLACEMENT = 15.0;
-    constexpr double COAST = 0.5;          // matches are older than the image when they come [s]
-    constexpr double LONGEST_BLIND = 3.0;  // that a base goes on by odometry [s]
+    constexpr int ENOUGH_CORRECTIONS = 10;  // of the scale, each by a fifth, until it is that of metres
+    constexpr double COAST = 0.5;           // matches are older than the image when they come [s]
+    constexpr double LONGEST_BLIND = 3.0;   // that a base goes on by odometry [s]
     if (!view_in_odom_)
     {
       giveUpAfter(stamp, started_, "the view was not found", HomingState::ACQUIRING, "looking for the view");
@@ -473,6 +489,12 @@ private:
     report_.roi_max = report_.heading + half_width;
 
     report_.manoeuvre = law_->text();
+    report_.goal_in_odom.reset();
+    if (tracked_ && tracker_.depthsKnown() && scale_corrections_ >= ENOUGH_CORRECTIONS)
+    {
+      report_.goal_in_odom = goalInOdom();
+      report_.goal_covariance = view_covariance_;
+    }
     report_.at_view = false;
     const bool blank = std::isnan(report_.similarity);
     const double unseen = stamp - last_trace_;
@@ -558,19 +580,21 @@ private:
   HeadingHypotheses hypotheses_;
   ViewTracker tracker_;
   std::unique_ptr<ApproachLaw> law_;
-  std::optional<PlanarPose> view_in_odom_;  // the view's level camera
-  double scale_ = 1.0;                      // metres in a unit of the tracker's
-  std::deque<Place> trail_;                 // of the camera, newest last
-  bool tracked_ = false;                    // in the last image
-  bool blind_ = true;                       // what was followed last were matches
-  double last_known_ = 0.0;                 // last_trace_ when the law of approach was told of it
-  double way_known_ = 0.0;                  // stamp of the last image with a way to the view
-  PlanarPose rest_;                         // where the base stood when the first of these images was taken
-  int images_at_rest_ = 0;                  // in a row
-  PlanarPose seen_from_;                    // base pose in odometry's frame when the view was last seen
-  PlanarPose blind_to_;                     // the newest base pose, to which the next two lead from there
-  double blind_distance_ = 0.0;             // [m]
-  double blind_turn_ = 0.0;                 // [rad]
+  std::optional<PlanarPose> view_in_odom_;                     // the view's level camera
+  double scale_ = 1.0;                                         // metres in a unit of the tracker's
+  int scale_corrections_ = 0;                                  // of it, by odometry
+  Eigen::Matrix3d view_covariance_ = Eigen::Matrix3d::Zero();  // of the view's place in odometry's frame [m, rad]
+  std::deque<Place> trail_;                                    // of the camera, newest last
+  bool tracked_ = false;                                       // in the last image
+  bool blind_ = true;                                          // what was followed last were matches
+  double last_known_ = 0.0;                                    // last_trace_ when the law of approach was told of it
+  double way_known_ = 0.0;                                     // stamp of the last image with a way to the view
+  PlanarPose rest_;              // where the base stood when the first of these images was taken
+  int images_at_rest_ = 0;       // in a row
+  PlanarPose seen_from_;         // base pose in odometry's frame when the view was last seen
+  PlanarPose blind_to_;          // the newest base pose, to which the next two lead from there
+  double blind_distance_ = 0.0;  // [m]
+  double blind_turn_ = 0.0;      // [rad]
   double within_since_ = NOT_A_NUMBER;
   int contradictions_ = 0;
 };

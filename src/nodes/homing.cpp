@@ -45,7 +45,7 @@ namespace view_servo
  *  - `cmd_vel` (geometry_msgs/Twist, in base_link) and `cmd_vel_stamped`, or `cmd_vel_dry` and `cmd_vel_dry_stamped`; zero
  *    for a while after each end, then nothing;
  *  - `heading` (view_servo/Heading): for each image; `heading_arrow` (geometry_msgs/PoseStamped): the same for rviz, at
- *    the base, its x axis towards the view, while there is a heading.
+ *    the base, its x axis towards the view, while there is a heading. `view_pose` (geometry_msgs/PoseWithCovarianceStamped).
  *
  * Action: `home` (view_servo/HomeToView).
  *
@@ -356,7 +356,7 @@ private:
     }
     outcomes_.accept();
     unanswered_ = outcome.frame_time;
-    output_.publish(report_);
+    output_.publish(report_, odometry_.frame());
     const bool ended = report_.state == HomingState::ARRIVED || report_.state == HomingState::FAILED;
     if (ended && !context_.goalRuns())
     {

@@ -4,7 +4,9 @@
 
 #include "view_servo/ros/conversions.h"
 
+#include <array>
 #include <cmath>
+#include <cstddef>
 #include <cstdint>
 
 namespace view_servo
@@ -84,6 +86,28 @@ Heading toHeading(const HomingReport& report, const std::string& base_frame)
   message.roi_max = report.roi_max;
   message.similarity = report.similarity;
   message.state = toHeadingState(report);
+  return message;
+}
+
+geometry_msgs::PoseWithCovarianceStamped toViewPose(const HomingReport& report, const std::string& odom_frame)
+{
+  constexpr std::size_t SIDE = 6;                         // of the message's covariance
+  const std::array<std::size_t, 3> places = { 0, 1, 5 };  // of x, y and yaw in it
+  geometry_msgs::PoseWithCovarianceStamped message;
+  message.header.stamp = toStamp(report.stamp);
+  message.header.frame_id = odom_frame;
+  message.pose.pose.position.x = report.goal_in_odom->x;
+  message.pose.pose.position.y = report.goal_in_odom->y;
+  message.pose.pose.orientation.z = std::sin(0.5 * report.goal_in_odom->yaw);
+  message.pose.pose.orientation.w = std::cos(0.5 * report.goal_in_odom->yaw);
+  for (std::size_t i = 0; i < places.size(); ++i)
+  {
+    for (std::size_t k = 0; k < places.size(); ++k)
+    {
+      message.pose.covariance[SIDE * places[i] + places[k]] =
+          report.goal_covariance(static_cast<int>(i), static_cast<int>(k));
+    }
+  }
   return message;
 }
 

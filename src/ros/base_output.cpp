@@ -16,7 +16,8 @@ BaseOutput::BaseOutput(ros::NodeHandle& nh, const std::string& command_topic, st
     commands_(nh.advertise<geometry_msgs::Twist>(command_topic, 1)),
     stamped_commands_(nh.advertise<geometry_msgs::TwistStamped>(command_topic + "_stamped", 1)),
     headings_(nh.advertise<Heading>("heading", 5)),
-    arrows_(nh.advertise<geometry_msgs::PoseStamped>("heading_arrow", 5))
+    arrows_(nh.advertise<geometry_msgs::PoseStamped>("heading_arrow", 5)),
+    view_poses_(nh.advertise<geometry_msgs::PoseWithCovarianceStamped>("view_pose", 5))
 {
 }
 
@@ -27,12 +28,16 @@ void BaseOutput::publish(const BaseVelocity& velocity) const
   stamped_commands_.publish(stamped);
 }
 
-void BaseOutput::publish(const HomingReport& report) const
+void BaseOutput::publish(const HomingReport& report, const std::string& odom_frame) const
 {
   headings_.publish(toHeading(report, base_frame_));
   if (std::isfinite(report.heading))
   {
     arrows_.publish(toHeadingArrow(report, base_frame_));
+  }
+  if (report.goal_in_odom)
+  {
+    view_poses_.publish(toViewPose(report, odom_frame));
   }
 }
 

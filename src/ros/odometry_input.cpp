@@ -70,6 +70,7 @@ std::optional<OdometryReading> OdometryReader::read(const nav_msgs::Odometry& me
     return std::nullopt;
   }
   input_.accept();
+  frame_ = withoutSlash(message.header.frame_id);
   return OdometryReading{ place, time, compose(child_pose, *base_in_child_) };
 }
 

@@ -101,6 +101,20 @@ double median(std::vector<double>& values)
   return quantile(values, 0.5);
 }
 
+/** Of where a landmark is seen, by (x, y, yaw) of the pose. */
+Eigen::Matrix<double, 2, 3> derivative(const Landmark& landmark, const PlanarPose& pose)
+{
+  constexpr double STEP = 1e-5;
+  Eigen::Matrix<double, 2, 3> result;
+  const auto difference = [&](const PlanarPose& step) -> Eigen::Vector2d {
+    const PlanarPose ahead{ pose.x + step.x, pose.y + step.y, pose.yaw + step.yaw };
+    const PlanarPose back{ pose.x - step.x, pose.y - step.y, pose.yaw - step.yaw };
+    return (project(landmark, ahead) - project(landmark, back)) / (2.0 * STEP);
+  };
+  result << difference({ STEP, 0.0, 0.0 }), difference({ 0.0, STEP, 0.0 }), difference({ 0.0, 0.0, STEP });
+  return result;
+}
+
 /** The depth of a landmark in the current camera divided by that in the stored view. */
 double depthRatio(const Landmark& landmark, const PlanarPose& pose)
 {
@@ -236,6 +250,7 @@ void ViewTracker::extend(const Correspondences& matches, const PlanarPose& pose)
 
 ViewTracker::Result ViewTracker::fit(const std::vector<Sighting>& sightings, double max_residual) const
 {
+  constexpr double LEAST_SD = 0.1;  // of where a point is found [px]
   const double focal = camera_.k(0, 0);
   Result result;
   result.looked_for = static_cast<int>(sightings.size());
@@ -254,6 +269,7 @@ ViewTracker::Result ViewTracker::fit(const std::vector<Sighting>& sightings, dou
   result.pose = refinePlanarPose(*found.model, sightings, params_.max_residual / focal);
   double squares = 0.0;
   std::vector<double> displacements;
+  Eigen::Matrix3d information = Eigen::Matrix3d::Zero();  // for residuals of a pixel
   for (const Sighting& sighting : sightings)
   {
     const double residual = focal * (project(sighting.landmark, result.pose) - sighting.current).norm();
@@ -262,12 +278,16 @@ ViewTracker::Result ViewTracker::fit(const std::vector<Sighting>& sightings, dou
       ++result.supporting;
       squares += residual * residual;
       displacements.push_back(focal * (sighting.current - sighting.landmark.reference).norm());
+      const Eigen::Matrix<double, 2, 3> jacobian = focal * derivative(sighting.landmark, result.pose);
+      information += jacobian.transpose() * jacobian;
     }
   }
   if (result.supporting > 0)
   {
     result.rms = std::sqrt(squares / result.supporting);
     result.displacement = median(displacements);
+    const double sd = std::max(result.rms, LEAST_SD);
+    result.covariance = sd * sd * information.inverse();
   }
   result.found = result.supporting >= params_.min_supporting;
   return result;

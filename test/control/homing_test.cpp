@@ -17,6 +17,7 @@
 #include <cstdint>
 #include <limits>
 #include <memory>
+#include <optional>
 #include <stdexcept>
 #include <string>
 #include <utility>
@@ -799,6 +800,33 @@ TEST(DifferentialHoming, StandsWhileTheViewIsHidden)
   run.runFor(100.0);
   EXPECT_EQ(run.report().state, HomingState::ARRIVED) << run.report().reason;
   EXPECT_LT(run.base().distance(), 0.01);
+}
+
+/** For a navigation stack: the truth is odometry's origin. */
+TEST(ServoHoming, TellsWhereTheViewIsInMetres)
+{
+  const Walls walls;
+  Drive run(walls, servoParams(), { -0.7, 0.2, 0.05 });
+  run.step();
+  EXPECT_FALSE(run.report().goal_in_odom);
+  double normalized = 0.0;
+  int count = 0;
+  while (run.time() < 60.0 && !run.ended())
+  {
+    run.step();
+    if (const std::optional<PlanarPose>& goal = run.report().goal_in_odom)
+    {
+      ++count;
+      EXPECT_LT(goal->distance(), 0.15);
+      const Eigen::Vector2d error(goal->x, goal->y);
+      normalized += error.dot(run.report().goal_covariance.topLeftCorner<2, 2>().inverse() * error);
+    }
+  }
+  EXPECT_GT(count, 20);
+  EXPECT_LT(normalized / count, 20.0);
+  EXPECT_GT(normalized / count, 0.02);
+  ASSERT_TRUE(run.report().goal_in_odom);
+  EXPECT_LT(run.report().goal_in_odom->distance(), 0.003);
 }
 
 TEST(MakeHoming, RefusesTheThesisWayForABaseThatCannotSlide)

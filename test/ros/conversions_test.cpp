@@ -3,6 +3,7 @@
 #include "view_servo/ros/conversions.h"
 
 #include "view_servo/images/image_io.h"
+#include "view_servo/ros/base_conversions.h"
 
 #include <gtest/gtest.h>
 #include <sensor_msgs/image_encodings.h>
@@ -382,6 +383,27 @@ TEST(MatchConversion, CopiesLinesAndWritesPlanesByRows)
                                          2.0, 4.0, 6.0, 8.0, 10., 12., 14., 16., 18. };
   EXPECT_EQ(toRowMajor({ h, 2.0 * h }), expected);
   EXPECT_TRUE(toRowMajor({}).empty());
+}
+
+TEST(BaseConversion, PutsTheViewsPoseIntoOdometrysFrame)
+{
+  HomingReport report;
+  report.stamp = 12.5;
+  report.goal_in_odom = PlanarPose{ 1.0, -2.0, 0.5 };
+  report.goal_covariance << 1.0, 2.0, 3.0, 2.0, 5.0, 6.0, 3.0, 6.0, 9.0;
+  const geometry_msgs::PoseWithCovarianceStamped message = toViewPose(report, "odom");
+  EXPECT_EQ(message.header.frame_id, "odom");
+  EXPECT_EQ(message.header.stamp, ros::Time(12.5));
+  EXPECT_EQ(message.pose.pose.position.x, 1.0);
+  EXPECT_EQ(message.pose.pose.position.y, -2.0);
+  EXPECT_NEAR(2.0 * std::atan2(message.pose.pose.orientation.z, message.pose.pose.orientation.w), 0.5, 1e-12);
+  EXPECT_EQ(message.pose.covariance[0], 1.0);
+  EXPECT_EQ(message.pose.covariance[1], 2.0);
+  EXPECT_EQ(message.pose.covariance[5], 3.0);
+  EXPECT_EQ(message.pose.covariance[7], 5.0);
+  EXPECT_EQ(message.pose.covariance[30], 3.0);
+  EXPECT_EQ(message.pose.covariance[35], 9.0);
+  EXPECT_EQ(message.pose.covariance[14], 0.0);
 }
 
 TEST(MatchConversion, HasNoNumbersWithoutGeometry)

@@ -16,6 +16,7 @@
 #include "view_servo/parameters/parameter.h"
 #include "view_servo/tracking/view_tracker.h"
 
+#include <Eigen/Core>
 #include <opencv2/core/mat.hpp>
 
 #include <limits>
@@ -103,6 +104,9 @@ struct HomingReport
    */
   double displacement = std::numeric_limits<double>::quiet_NaN();
   int inliers = 0;  ///< number of matches or points that agree; mode THESIS: of all matches
+  /** The base's pose at the view, in odometry's frame; empty until its distance is known in metres, and when it is lost. */
+  std::optional<PlanarPose> goal_in_odom;
+  Eigen::Matrix3d goal_covariance = Eigen::Matrix3d::Zero();  ///< of its (x, y, yaw) [m, rad]
   /** How much later than images odometry is stamped; see ClockOffset [s]. */
   double odometry_delay = std::numeric_limits<double>::quiet_NaN();
 };

@@ -10,6 +10,7 @@
 #include "view_servo/geometry/planar_pose.h"
 
 #include <geometry_msgs/PoseStamped.h>
+#include <geometry_msgs/PoseWithCovarianceStamped.h>
 #include <geometry_msgs/TwistStamped.h>
 #include <nav_msgs/Odometry.h>
 #include <ros/time.h>
@@ -36,6 +37,9 @@ geometry_msgs::TwistStamped toTwistStamped(const BaseVelocity& velocity, const r
 HeadingEvidence toHeadingEvidence(const std::vector<PointMatch>& matches);
 
 Heading toHeading(const HomingReport& report, const std::string& base_frame);
+
+/** Where the base has to be. The report must have a goal_in_odom. */
+geometry_msgs::PoseWithCovarianceStamped toViewPose(const HomingReport& report, const std::string& odom_frame);
 
 /** The direction to the view for rviz: a pose at the base with its x axis towards the view. */
 geometry_msgs::PoseStamped toHeadingArrow(const HomingReport& report, const std::string& base_frame);

@@ -13,8 +13,8 @@
 namespace view_servo
 {
 /**
- * Publishes what homing sends besides its status: commands as Twist and TwistStamped, and the heading, with an arrow
- * for rviz.
+ * Publishes what homing sends besides its status: commands as Twist and TwistStamped, the heading, with an arrow for
+ * rviz, and `view_pose`, where the base has to be, in odometry's frame.
  */
 class BaseOutput
 {
@@ -24,8 +24,8 @@ public:
 
   /** Publishes a command. */
   void publish(const BaseVelocity& velocity) const;
-  /** Publishes the heading, and the arrow while there is one. */
-  void publish(const HomingReport& report) const;
+  /** Publishes the heading, and the arrow and where the base has to be while they are known. */
+  void publish(const HomingReport& report, const std::string& odom_frame) const;
 
   /** Whether somebody subscribes to commands. */
   bool hasListener() const;
@@ -36,6 +36,7 @@ private:
   ros::Publisher stamped_commands_;
   ros::Publisher headings_;
   ros::Publisher arrows_;
+  ros::Publisher view_poses_;
 };
 
 }  // namespace view_servo

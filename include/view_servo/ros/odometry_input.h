@@ -45,6 +45,12 @@ public:
     return input_;
   }
 
+  /** The frame that odometry's poses are in; empty until one has come. */
+  const std::string& frame() const
+  {
+    return frame_;
+  }
+
   /** Takes what remains of the delay after `~odometry_delay`, see ClockOffset [s]; NaN: not known. */
   void setRemainingDelay(double delay);
   /** How much later than images odometry is stamped; NaN while that is not known [s]. */
@@ -63,6 +69,7 @@ private:
   const std::string base_frame_;
   const double delay_;
   double measured_delay_ = std::numeric_limits<double>::quiet_NaN();
+  std::string frame_;
   std::string child_frame_;                  // whose pose odometry is
   std::optional<PlanarPose> base_in_child_;  // of ~base_frame in that frame
 };

@@ -10,6 +10,7 @@
 #include <Eigen/Core>
 #include <opencv2/core/mat.hpp>
 
+#include <limits>
 #include <optional>
 #include <string>
 #include <vector>
@@ -87,6 +88,11 @@ public:
   {
     bool found = false;  ///< whether enough landmarks support a pose
     PlanarPose pose;     ///< valid when found
+    /**
+     * Of (x, y, yaw) of the pose, as the supporting landmarks' residuals let one expect it, with the structure taken for
+     * exact; NaN unless found [unit of the structure, rad].
+     */
+    Eigen::Matrix3d covariance = Eigen::Matrix3d::Constant(std::numeric_limits<double>::quiet_NaN());
     /** track(): landmarks predicted to be in the image, in about its scale; locate(): those matched. */
     int looked_for = 0;
     int supporting = 0;         ///< landmarks found where the pose puts them
