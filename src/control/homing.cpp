@@ -155,13 +155,9 @@ public:
 
   Course course() const override
   {
-    if (!view_in_odom_ || ended() || report_.state == HomingState::ACQUIRING)
+    if (!view_in_odom_ || ended() || report_.state == HomingState::LOST || report_.state == HomingState::ACQUIRING)
     {
       return Course();
-    }
-    if (report_.state == HomingState::LOST)
-    {
-      return wayBack();
     }
     Course course = law_->course();
     if (blind_)
@@ -313,7 +309,7 @@ private:
     view_in_odom_ = view_in_odom;
     blind_ = !tracked_;
     last_trace_ = std::max(stamp, last_trace_);
-    seen_from_ = blind_to_ = *odometry_.newest();
+    blind_to_ = *odometry_.newest();
     blind_distance_ = blind_turn_ = 0.0;
   }
 
@@ -353,27 +349,6 @@ private:
     return params_.approach.base == BaseKind::DIFFERENTIAL && blind_distance_ <= limits.max_blind_distance &&
            blind_turn_ <= limits.max_blind_turn &&
            shareInSight(compose(inverse(goalInOdom()), *odometry_.newest())) < limits.min_share;
-  }
-
-  /** A base that has gone on blindly goes back to where it saw the view. */
-  Course wayBack() const
-  {
-    constexpr double THERE = 0.02;    // [m]
-    constexpr double PATIENCE = 1.0;  // one of the next images may show the view [s]
-    Course course;
-    if (params_.approach.base == BaseKind::DIFFERENTIAL && report_.stamp - last_trace_ > PATIENCE)
-    {
-      const PlanarPose base = *odometry_.newest();
-      course = law_->course();
-      course.max_speed = params_.blind_speed;
-      course.distance_tolerance = THERE;
-      course.yaw_tolerance = params_.approach.yaw_tolerance;
-      const bool there = compose(inverse(base), seen_from_).distance() <= THERE;
-      // It has turned first, then driven straight.
-      course.kind = there ? Course::TURN : Course::LINE;
-      course.end = there ? seen_from_ : PlanarPose{ seen_from_.x, seen_from_.y, base.yaw };
-    }
-    return course;
   }
 
   /** After the points were not found: where are they by matches? */
@@ -591,8 +566,7 @@ private:
   double way_known_ = 0.0;                                     // stamp of the last image with a way to the view
   PlanarPose rest_;              // where the base stood when the first of these images was taken
   int images_at_rest_ = 0;       // in a row
-  PlanarPose seen_from_;         // base pose in odometry's frame when the view was last seen
-  PlanarPose blind_to_;          // the newest base pose, to which the next two lead from there
+  PlanarPose blind_to_;          // the newest base pose; the next two are the way there since the view was seen
   double blind_distance_ = 0.0;  // [m]
   double blind_turn_ = 0.0;      // [rad]
   double within_since_ = NOT_A_NUMBER;
