@@ -124,7 +124,8 @@ struct HomingTarget
 };
 
 /**
- * Brings a base back to where a view was stored, from what is matched in the camera's images and from its odometry. Knows no ROS; times are those of the images [s] and may run at any speed, but not back.
+ * Brings a base back to where a view was stored, from what is matched in the camera's images and from its odometry.
+ * Knows no ROS; times are those of the images [s] and may run at any speed, but not back.
  */
 class Homing
 {
