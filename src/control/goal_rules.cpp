@@ -51,7 +51,8 @@ Verdict judge(const Circumstances& circumstances, const Progress& progress)
   }
   if (progress.state == Progress::FAILED)
   {
-    return { Verdict::ABORT, reasonOf(progress) };
+    const std::string& missing = circumstances.missing_input;
+    return { Verdict::ABORT, reasonOf(progress) + (missing.empty() ? "" : ": " + missing) };
   }
   if (!(circumstances.elapsed <= circumstances.timeout))
   {

@@ -61,7 +61,7 @@ struct Verdict
  * Judges a goal. The first of these conditions that holds decides: the node ends, another goal has come, the driver's
  * state cannot be trusted, it is disabled, the goal is cancelled, the robot has arrived, the driver has given up, the
  * time is over, nobody listens, an input is missing, the robot is held. The last three do not matter while the goal is
- * prepared.
+ * prepared. A driver that gives up may do so for want of an input: the reason says both then.
  */
 Verdict judge(const Circumstances& circumstances, const Progress& progress);
 
