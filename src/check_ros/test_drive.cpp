@@ -184,15 +184,24 @@ Finding TestDrive::judgeClocks(const CameraFrame& before) const
   const std::string name = "move clocks";
   const CameraMount camera_mount = mount(before);
   ClockOffset clocks = robot_.odometry()->clocks();
-  const std::size_t step = trace_.size() / MOST + 1;
-  for (std::size_t i = 0; i < trace_.size() && !given_up_(); i += step)
+  const std::size_t count = std::min(trace_.size(), MOST);
+  for (std::size_t i = 0; i < count && !given_up_(); ++i)
   {
-    const ImagePair images{ greyOf(before), greyOf(trace_[i]), toCamera(*before.info) };
+    const CameraFrame& frame = trace_[i * trace_.size() / count];
+    const ImagePair images{ greyOf(before), greyOf(frame), toCamera(*before.info) };
     const SeenMotion seen = seenByBase(images, camera_mount, PlanarPose());
     // Where the picture has hardly changed the base has not turned yet, or is back.
-    clocks.addImage(trace_[i].image->header.stamp.toSec(), seen.motion ? -seen.motion->rotation.z() : 0.0);
+    clocks.addImage(frame.image->header.stamp.toSec(), seen.motion ? -seen.motion->rotation.z() : 0.0);
   }
   const std::optional<double> offset = clocks.estimate();
+  if (trace_.size() < ClockOffset::FEWEST_IMAGES)
+  {
+    return warning(
+        name,
+        "only " + std::to_string(trace_.size()) +
+            " images came during the turns: too few to tell how far the stamps of odometry and images are apart",
+        "try a larger --angle, and see the rate of images above");
+  }
   if (!offset)
   {
     return warning(name, "the turn was too short to tell how far the stamps of odometry and images are apart",

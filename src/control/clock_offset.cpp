@@ -98,7 +98,6 @@ std::optional<double> ClockOffset::estimate() const
 
 ClockOffset::Fit ClockOffset::fit(double turn_error) const
 {
-  constexpr std::size_t FEWEST = 15;     // images
   constexpr double CLEAR = 0.0006;       // what a wrong offset has to leave unexplained [rad]
   constexpr double CLEARLY_WORSE = 4.0;  // than the best one
   constexpr int NEIGHBOUR = 5;           // steps to a wrong offset: 0.1 s
@@ -110,7 +109,7 @@ ClockOffset::Fit ClockOffset::fit(double turn_error) const
   std::copy_if(images_.begin(), images_.end(), std::back_inserter(images), [this](const Sample& image) {
     return image.stamp - LARGEST >= odometry_.front().stamp && image.stamp + LARGEST <= odometry_.back().stamp;
   });
-  if (images.size() < FEWEST)
+  if (images.size() < FEWEST_IMAGES)
   {
     return {};
   }

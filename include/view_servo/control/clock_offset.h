@@ -2,6 +2,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <cstddef>
 #include <deque>
 #include <optional>
 
@@ -24,11 +25,12 @@ public:
 
   /**
    * Odometry's stamp minus the image's for one and the same moment [s], within +-LARGEST; by the last seconds. Empty
-   * while the base has not turned enough to tell.
+   * while the base has not turned enough to tell, or fewer than FEWEST_IMAGES have seen it.
    */
   std::optional<double> estimate() const;
 
   static constexpr double LARGEST = 0.6;  ///< [s]
+  static constexpr std::size_t FEWEST_IMAGES = 15;
 
 private:
   struct Sample
