@@ -349,7 +349,7 @@ class CheckRobot(graph.GraphTest):
 
     def test_4_moves(self):
         # On a busy machine images come seldom: turns have to be long enough to see how they begin and end.
-        short = ["--json", "--move", "--yes", "--distance", "0.05", "--angle", "20"]
+        short = ["--json", "--move", "--yes", "--distance", "0.05", "--angle", "15"]
         arm = self.begin("arm_moves", *short[:-1], "8", arm=True)
         lines = self.outcome(self.begin("base_moves", *short))
         self.skip_when_too_busy(lines)
