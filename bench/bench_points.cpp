@@ -2,7 +2,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 
 /** @file
- * Point matching against OpenCV's SIFT (500 key points) and AKAZE, in one run on the same images:
+ * Point matching against OpenCV's SIFT, AKAZE and ORB, in one run on the same images:
  *
  *     bench_points oxford|tilt|time [--runs N] [--set name=value ...]
  *
@@ -10,7 +10,8 @@
  *   error of the reference's four corners under 10 px; a match is correct within 4 px of the ground truth.
  * - tilt: planes textured with pictures of Debian's opencv-doc and visp-images-data, tilted 0 .. 80 degrees. Solved
  *   means a corner error under 5 px.
- * - time: medians of a whole match, and of one against a stored reference, as ratios to SIFT's.
+ * - time: medians of a match against a stored reference, of one of two fresh images, and of one where there is nothing to be
+ *   found, in processor time, beside ORB, AKAZE and SIFT.
  */
 #include "experiments/peer_matches.h"
 #include "view_servo/parameters/parameter.h"
@@ -26,6 +27,7 @@
 #include <opencv2/imgproc.hpp>
 
 #include <sys/resource.h>
+#include <time.h>
 
 #include <algorithm>
 #include <chrono>
@@ -37,6 +39,7 @@
 #include <functional>
 #include <iostream>
 #include <limits>
+#include <memory>
 #include <optional>
 #include <string>
 #include <vector>
@@ -125,44 +128,73 @@ Answer runOurs(const PointViewMatcherParams& params, const Problem& problem)
 }
 
 /** Key points, ratio test at 0.8, RANSAC at 3 px. */
-Answer runPeer(const cv::Ptr<cv::Feature2D>& detector, const cv::Ptr<cv::DescriptorMatcher>& matcher,
-               const Problem& problem)
+struct Peer
+{
+  std::string name;
+  cv::Ptr<cv::Feature2D> detector;
+  cv::Ptr<cv::DescriptorMatcher> matcher;
+
+  PeerFeatures prepare(const cv::Mat& image) const
+  {
+    return featuresOfPeer(detector, image);
+  }
+  Answer match(const PeerFeatures& reference, const PeerFeatures& current) const
+  {
+    const auto [from, to] = matchesOfPeer(matcher, reference, current);
+    Answer answer;
+    cv::Mat h;
+    std::vector<unsigned char> mask;
+    if (from.size() >= 4)
+    {
+      h = cv::findHomography(from, to, cv::RANSAC, 3.0, mask, 2000, 0.995);
+    }
+    if (!h.empty())
+    {
+      Eigen::Matrix3d matrix;
+      cv::cv2eigen(h, matrix);
+      answer.h = matrix;
+    }
+    for (std::size_t i = 0; i < from.size(); ++i)
+    {
+      answer.candidates.push_back({ { from[i].x, from[i].y }, { to[i].x, to[i].y } });
+      if (answer.h && mask[i] != 0)
+      {
+        answer.inliers.push_back(answer.candidates.back());
+      }
+    }
+    return answer;
+  }
+};
+
+Peer makeSift(int count)
+{
+  return { "SIFT " + std::to_string(count), cv::SIFT::create(count), cv::makePtr<cv::FlannBasedMatcher>() };
+}
+Peer makeAkaze()
+{
+  return { "AKAZE", cv::AKAZE::create(), cv::makePtr<cv::BFMatcher>(cv::NORM_HAMMING) };
+}
+Peer makeOrb(int count)
+{
+  return { "ORB " + std::to_string(count), cv::ORB::create(count), cv::makePtr<cv::BFMatcher>(cv::NORM_HAMMING) };
+}
+
+Answer runPeer(const Peer& peer, const Problem& problem)
 {
   const auto start = std::chrono::steady_clock::now();
-  const auto [from, to] = matchesOfPeer(detector, matcher, problem.reference, problem.current);
-  Answer answer;
-  cv::Mat h;
-  std::vector<unsigned char> mask;
-  if (from.size() >= 4)
-  {
-    h = cv::findHomography(from, to, cv::RANSAC, 3.0, mask, 2000, 0.995);
-  }
-  if (!h.empty())
-  {
-    Eigen::Matrix3d matrix;
-    cv::cv2eigen(h, matrix);
-    answer.h = matrix;
-  }
+  Answer answer = peer.match(peer.prepare(problem.reference), peer.prepare(problem.current));
   answer.ms = millisecondsSince(start);
-  for (std::size_t i = 0; i < from.size(); ++i)
-  {
-    answer.candidates.push_back({ { from[i].x, from[i].y }, { to[i].x, to[i].y } });
-    if (answer.h && mask[i] != 0)
-    {
-      answer.inliers.push_back(answer.candidates.back());
-    }
-  }
   return answer;
 }
 
 Answer runSift(const Problem& problem)
 {
-  return runPeer(cv::SIFT::create(500), cv::makePtr<cv::FlannBasedMatcher>(), problem);
+  return runPeer(makeSift(500), problem);
 }
 
 Answer runAkaze(const Problem& problem)
 {
-  return runPeer(cv::AKAZE::create(), cv::makePtr<cv::BFMatcher>(cv::NORM_HAMMING), problem);
+  return runPeer(makeAkaze(), problem);
 }
 
 std::optional<Problem> loadProblem(const std::filesystem::path& sequence, int number)
@@ -407,53 +439,121 @@ double median(std::vector<double> values)
   return values[values.size() / 2];
 }
 
+/** Processor time of this process, of all its threads [ms]. */
+double processorTime()
+{
+  timespec time{};
+  clock_gettime(CLOCK_PROCESS_CPUTIME_ID, &time);
+  return 1e3 * static_cast<double>(time.tv_sec) + 1e-6 * static_cast<double>(time.tv_nsec);
+}
+
+/** What a matcher takes for one problem, again and again [ms]. */
+struct Timing
+{
+  std::string name;
+  std::function<void(const cv::Mat&)> store;    // prepares a reference
+  std::function<Answer(const cv::Mat&)> match;  // the stored reference with an image
+  std::vector<double> fresh;                    // processor time of both
+  std::vector<double> stored;                   // of `match` alone
+  std::vector<double> nothing;                  // of `match` with an image of something else
+  Answer answer;
+
+  /** @param wanted whether this run counts. */
+  void run(const Problem& problem, const cv::Mat& unrelated, bool wanted)
+  {
+    const double start = processorTime();
+    store(problem.reference);
+    const double prepared = processorTime();
+    answer = match(problem.current);
+    const double matched = processorTime();
+    match(unrelated);
+    const double failed = processorTime();
+    if (wanted)
+    {
+      fresh.push_back(matched - start);
+      stored.push_back(matched - prepared);
+      nothing.push_back(failed - matched);
+    }
+  }
+};
+
+Timing timingOf(const Peer& peer)
+{
+  const auto stored = std::make_shared<PeerFeatures>();
+  Timing timing;
+  timing.name = peer.name;
+  timing.store = [=](const cv::Mat& image) {
+    *stored = peer.prepare(image);
+  };
+  timing.match = [=](const cv::Mat& image) {
+    return peer.match(*stored, peer.prepare(image));
+  };
+  return timing;
+}
+
+/** @param stages of the last match. */
+Timing timingOfOurs(const PointViewMatcherParams& params, std::vector<StageTime>& stages)
+{
+  const auto stored = std::make_shared<std::unique_ptr<PreparedImage>>();
+  const auto matcher = std::make_shared<PointViewMatcher>(params);
+  Timing timing;
+  timing.name = "view_servo";
+  timing.store = [=](const cv::Mat& image) {
+    *stored = std::make_unique<PreparedImage>(image, cv::Rect(), matcher->params().points);
+    (*stored)->profileIndex(0);
+  };
+  timing.match = [=, &stages](const cv::Mat& image) {
+    const PreparedImage current(image, cv::Rect(), matcher->params().points);
+    const ViewMatch match = matcher->match(**stored, current, GeometryModel::HOMOGRAPHY);
+    stages = match.outcome == MatchOutcome::MATCHED ? match.stages : stages;
+    return fromMatch(match);
+  };
+  return timing;
+}
+
 int timing(const PointViewMatcherParams& params, int runs)
 {
   const cv::Mat texture = loadTexture("graf1.png");
-  if (texture.empty())
+  const cv::Mat other = loadTexture("building.jpg");
+  if (texture.empty() || other.empty())
   {
     std::cout << "time: skipped, opencv-doc is not installed\n";
     return 0;
   }
   const Problem problem = tiltedPlane("graf1.png", texture, 45.0, 0, 1);
-  std::printf("%s tilted by 45 degrees, 768x576, %d threads, medians of %d runs in ms\n", problem.name.c_str(),
-              cv::getNumThreads(), runs);
-  const PointViewMatcher matcher(params);
-  const PreparedImage stored(problem.reference, cv::Rect(), params.points);
-  std::vector<double> fresh_ms;
-  std::vector<double> stored_ms;
-  std::vector<double> sift_ms;
-  std::vector<double> akaze_ms;
-  std::vector<std::vector<StageTime>> stages;
-  for (int run = 0; run < runs + 1; ++run)
+  const Problem unrelated = tiltedPlane("building.jpg", other, 0.0, 0, 1);
+  for (const int threads : { 1, 2 })
   {
-    const double ours = runOurs(params, problem).ms;
-    const auto start = std::chrono::steady_clock::now();
-    const PreparedImage current(problem.current, cv::Rect(), params.points);
-    const ViewMatch match = matcher.match(stored, current, GeometryModel::HOMOGRAPHY);
-    const double against_stored = millisecondsSince(start);
-    const double sift = runSift(problem).ms;
-    const double akaze = runAkaze(problem).ms;
-    if (run > 0)  // the first warms up
+    cv::setNumThreads(threads);
+    std::vector<StageTime> stages;
+    std::vector<std::vector<StageTime>> all_stages;
+    std::vector<Timing> timings = { timingOfOurs(params, stages), timingOf(makeOrb(1000)), timingOf(makeOrb(2000)),
+                                    timingOf(makeAkaze()),        timingOf(makeSift(500)), timingOf(makeSift(2000)) };
+    for (int run = 0; run < runs + 1; ++run)  // the first warms up
     {
-      fresh_ms.push_back(ours);
-      stored_ms.push_back(against_stored);
-      sift_ms.push_back(sift);
-      akaze_ms.push_back(akaze);
-      stages.push_back(match.stages);
+      for (Timing& timing : timings)
+      {
+        timing.run(problem, unrelated.reference, run > 0);
+      }
+      all_stages.push_back(stages);
     }
-  }
-  const double sift = median(sift_ms);
-  std::printf("SIFT 500              %7.1f\n", sift);
-  std::printf("AKAZE                 %7.1f  %.2f of SIFT\n", median(akaze_ms), median(akaze_ms) / sift);
-  std::printf("both images fresh     %7.1f  %.2f of SIFT\n", median(fresh_ms), median(fresh_ms) / sift);
-  std::printf("reference stored      %7.1f  %.2f of SIFT\n", median(stored_ms), median(stored_ms) / sift);
-  for (std::size_t i = 0; i < stages.front().size(); ++i)
-  {
-    std::vector<double> ms(stages.size());
-    std::transform(stages.begin(), stages.end(), ms.begin(),
-                   [i](const std::vector<StageTime>& run) { return run[i].ms; });
-    std::printf("  %-20s%7.1f\n", stages.front()[i].name.c_str(), median(ms));
+    std::printf(
+        "%s tilted by 45 degrees, 768x576, threads: %d, processor time, medians of %d runs in ms\n"
+        "%-12s%9s%9s%9s%18s\n",
+        problem.name.c_str(), threads, runs, "", "stored", "fresh", "nothing", "correct inliers");
+    for (const Timing& timing : timings)
+    {
+      std::printf("%-12s%9.1f%9.1f%9.1f%18d\n", timing.name.c_str(), median(timing.stored), median(timing.fresh),
+                  median(timing.nothing), correct(timing.answer.inliers, problem.truth));
+    }
+    std::printf("stages of view_servo, by the clock:\n");
+    for (std::size_t i = 0; i < stages.size(); ++i)
+    {
+      std::vector<double> ms(all_stages.size());
+      std::transform(all_stages.begin(), all_stages.end(), ms.begin(),
+                     [i](const std::vector<StageTime>& run) { return run[i].ms; });
+      std::printf("  %-20s%7.1f\n", stages[i].name.c_str(), median(ms));
+    }
   }
   return 0;
 }

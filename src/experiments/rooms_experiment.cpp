@@ -254,7 +254,8 @@ Answer answerOfPeer(const cv::Ptr<cv::Feature2D>& detector, const cv::Ptr<cv::De
                     const RoomPair& pair)
 {
   constexpr std::size_t ENOUGH = 15;
-  const auto [from, to] = matchesOfPeer(detector, matcher, pair.reference, pair.current);
+  const auto [from, to] =
+      matchesOfPeer(matcher, featuresOfPeer(detector, pair.reference), featuresOfPeer(detector, pair.current));
   if (from.size() < ENOUGH)
   {
     return {};
