@@ -2,6 +2,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "view_servo/features/corners.h"
 
+#include <opencv2/core/hal/intrin.hpp>
 #include <opencv2/imgproc.hpp>
 
 #include <algorithm>
@@ -43,9 +44,11 @@ cv::Mat harrisResponse(const cv::Mat& image, const CornerParams& params)
   const cv::Mat window = gaussianKernel(params.integration_sigma, 0);
   cv::Mat response(image.size(), CV_32F);
 
-  // Stripes of rows are independent: each is filtered from its rows and as many beside them as the kernels reach.
+  // Stripes of rows are independent: each is filtered from its rows and as many beside them as the kernels reach. They are so
+  // narrow that all of what is computed on the way stays in the processor's cache.
+  constexpr int STRIPE = 64;  // [rows]
   const int reach = smooth.cols / 2 + window.cols / 2;
-  const int stripes = std::max(1, std::min(cv::getNumThreads(), image.rows / 64));
+  const int stripes = std::max(1, image.rows / STRIPE);
   cv::parallel_for_(cv::Range(0, stripes), [&](const cv::Range& range) {
     for (int stripe = range.start; stripe < range.end; ++stripe)
     {
@@ -84,34 +87,55 @@ cv::Mat harrisResponse(const cv::Mat& image, const CornerParams& params)
   return response;
 }
 
+/** Stronger ones first; a total order, so that the result does not depend on the sorting algorithm. */
+bool isStronger(const Peak& a, const Peak& b)
+{
+  return a.response != b.response ? a.response > b.response : (a.v != b.v ? a.v < b.v : a.u < b.u);
+}
+
+/** Whether a pixel may be a maximum, by its neighbours in the same row and column; tells four at once. */
+bool anyMayBeMaximum(const float* above, const float* here, const float* below)
+{
+  const cv::v_float32x4 r = cv::v_load(here);
+  const cv::v_float32x4 may = (r > cv::v_setzero_f32()) & (r >= cv::v_load(here - 1)) & (r > cv::v_load(here + 1)) &
+                              (r >= cv::v_load(above)) & (r > cv::v_load(below));
+  return cv::v_check_any(may);
+}
+
+/** In no order. */
 std::vector<Peak> localMaxima(const cv::Mat& response, const cv::Mat& mask, int border)
 {
+  constexpr int LANES = 4;
   std::vector<Peak> peaks;
+  const auto isMaximum = [](const float* above, const float* here, const float* below) {
+    const float r = here[0];
+    // Strict against the neighbours that come later and not strict before: a plateau of two gives one peak.
+    return r > 0.0F && r >= here[-1] && r > here[1] && r >= above[-1] && r >= above[0] && r >= above[1] &&
+           r > below[-1] && r > below[0] && r > below[1];
+  };
   for (int v = border; v < response.rows - border; ++v)
   {
     const float* above = response.ptr<float>(v - 1);
     const float* here = response.ptr<float>(v);
     const float* below = response.ptr<float>(v + 1);
     const unsigned char* wanted = mask.empty() ? nullptr : mask.ptr<unsigned char>(v);
-    for (int u = border; u < response.cols - border; ++u)
+    const int end = response.cols - border;
+    for (int u = border; u < end; u += LANES)
     {
-      const float r = here[u];
-      // Strict against the neighbours that come later and not strict before: a plateau of two gives one peak.
-      if (r <= 0.0F || r < here[u - 1] || r <= here[u + 1] || r < above[u - 1] || r < above[u] || r < above[u + 1] ||
-          r <= below[u - 1] || r <= below[u] || r <= below[u + 1])
+      const bool whole = u + LANES < response.cols;
+      if (whole && !anyMayBeMaximum(above + u, here + u, below + u))
       {
         continue;
       }
-      if (wanted == nullptr || wanted[u] != 0)
+      for (int k = u; k < std::min(u + LANES, end); ++k)
       {
-        peaks.push_back({ u, v, r });
+        if (isMaximum(above + k, here + k, below + k) && (wanted == nullptr || wanted[k] != 0))
+        {
+          peaks.push_back({ k, v, here[k] });
+        }
       }
     }
   }
-  // A total order, so that the result does not depend on the sorting algorithm.
-  std::sort(peaks.begin(), peaks.end(), [](const Peak& a, const Peak& b) {
-    return a.response != b.response ? a.response > b.response : (a.v != b.v ? a.v < b.v : a.u < b.u);
-  });
   return peaks;
 }
 
@@ -179,7 +203,13 @@ std::vector<Corner> detectCorners(const cv::Mat& image, const CornerParams& para
     return corners;
   }
   const cv::Mat response = harrisResponse(image, params);
-  const std::vector<Peak> peaks = localMaxima(response, mask, params.border);
+  std::vector<Peak> peaks = localMaxima(response, mask, params.border);
+  // Most are never looked at: a heap gives one after the other.
+  const auto isWeaker = [](const Peak& a, const Peak& b) {
+    return isStronger(b, a);
+  };
+  std::make_heap(peaks.begin(), peaks.end(), isWeaker);
+  const double weakest = peaks.empty() ? 0.0 : params.relative_threshold * static_cast<double>(peaks.front().response);
 
   // Strongest first, each taken unless one already taken is too close; a grid keeps the search local.
   const double cell = params.min_distance + 2.0;  // refinement moves each of two peaks by a pixel at most
@@ -190,10 +220,11 @@ std::vector<Corner> detectCorners(const cv::Mat& image, const CornerParams& para
     return static_cast<std::size_t>(v) * static_cast<std::size_t>(grid_cols) + static_cast<std::size_t>(u);
   };
   const double min_squared = params.min_distance * params.min_distance;
-  for (const Peak& peak : peaks)
+  for (; !peaks.empty() && static_cast<int>(corners.size()) < params.max_corners; peaks.pop_back())
   {
-    if (static_cast<int>(corners.size()) == params.max_corners ||
-        static_cast<double>(peak.response) < params.relative_threshold * static_cast<double>(peaks.front().response))
+    std::pop_heap(peaks.begin(), peaks.end(), isWeaker);
+    const Peak& peak = peaks.back();
+    if (static_cast<double>(peak.response) < weakest)
     {
       break;
     }

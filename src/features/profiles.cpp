@@ -4,6 +4,8 @@
 
 #include "view_servo/images/sampling.h"
 
+#include <Eigen/Core>
+#include <Eigen/Geometry>
 #include <opencv2/core.hpp>
 
 #include <algorithm>
@@ -28,103 +30,100 @@ int sampleCount(double length)
   return std::min(MAX_SAMPLES, std::max(SAMPLE_STEP, steps * SAMPLE_STEP));
 }
 
-/** The basis vectors of eq. 6.3 at (i + 1/2)/N, divided by N; row i holds sin 1, cos 1, sin 2, .. */
+/**
+ * The basis vectors of eq. 6.3 at (i + 1/2)/N, divided by N, for the first half of the samples: in the second they are the
+ * same backwards, or the negative of that. Of each order one of sine and cosine is the one, and one the other.
+ */
 class Basis
 {
 public:
-  Basis(int samples, int coefficients) : coefficients_(static_cast<std::size_t>(coefficients)), sums_{}
+  using Row = Eigen::Array<float, MAX_COEFFICIENTS / 2, 1>;  // by order
+
+  explicit Basis(int samples) : even_sum_(Row::Zero())
   {
-    for (int i = 0; i < samples; ++i)
+    for (int i = 0; i < samples / 2; ++i)
     {
-      for (int c = 0; c < coefficients; ++c)
+      even_.emplace_back();
+      odd_.emplace_back();
+      for (int k = 0; k < MAX_COEFFICIENTS / 2; ++k)
       {
-        const int order = c / 2 + 1;
-        const double phase = M_PI * order * (i + 0.5) / samples;
-        const double value = (c % 2 == 0 ? std::sin(phase) : std::cos(phase)) / samples;
-        values_.push_back(static_cast<float>(value));
-        sums_[c] += static_cast<float>(value);
+        const double phase = M_PI * (k + 1) * (i + 0.5) / samples;
+        const double sine = std::sin(phase) / samples;
+        const double cosine = std::cos(phase) / samples;
+        const bool sine_is_even = reversalSign(2 * k) > 0.0F;
+        even_.back()[k] = static_cast<float>(sine_is_even ? sine : cosine);
+        odd_.back()[k] = static_cast<float>(sine_is_even ? cosine : sine);
       }
+      even_sum_ += 2.0F * even_.back();
     }
   }
-  const float* row(int i) const
+  /** At a sample of the first half; the same at the one that mirrors it. */
+  const Row& even(int i) const
   {
-    return values_.data() + static_cast<std::size_t>(i) * coefficients_;
+    return even_[static_cast<std::size_t>(i)];
   }
-  float sum(int c) const
+  /** At a sample of the first half; the negative at the one that mirrors it. */
+  const Row& odd(int i) const
   {
-    return sums_[c];
+    return odd_[static_cast<std::size_t>(i)];
+  }
+  /** The sum of even ones over all samples; that of odd ones is zero. */
+  const Row& evenSum() const
+  {
+    return even_sum_;
   }
 
 private:
-  std::size_t coefficients_;
-  std::vector<float> values_;
-  float sums_[MAX_COEFFICIENTS];
+  std::vector<Row> even_;
+  std::vector<Row> odd_;
+  Row even_sum_;
 };
 
-/** All tables that profiles up to a length need. */
-std::vector<Basis> basisTables(int coefficients)
+/** All tables that profiles need, the one of n steps of samples at place n - 1. */
+const std::vector<Basis>& basisTables()
 {
-  std::vector<Basis> tables;
-  for (int samples = SAMPLE_STEP; samples <= MAX_SAMPLES; samples += SAMPLE_STEP)
-  {
-    tables.emplace_back(samples, coefficients);
-  }
+  static const std::vector<Basis> tables = [] {
+    std::vector<Basis> result;
+    for (int samples = SAMPLE_STEP; samples <= MAX_SAMPLES; samples += SAMPLE_STEP)
+    {
+      result.emplace_back(samples);
+    }
+    return result;
+  }();
   return tables;
 }
 
-template <int Coefficients>
-bool describe(const BilinearSampler& image, const Eigen::Vector2d& start, const Eigen::Vector2d& end, int samples,
-              const Basis& basis, double min_contrast, float* features)
+/** Both ends have to lie in the image. @return false when the contrast is too low. */
+bool describe(const BilinearSampler& image, const Eigen::Vector2d& start, const Eigen::Vector2d& end, int coefficients,
+              double min_contrast, float* features)
 {
-  float intensities[MAX_SAMPLES];
-  float sums[Coefficients] = {};
+  const int samples = sampleCount((end - start).norm());
+  const Basis& basis = basisTables()[static_cast<std::size_t>(samples / SAMPLE_STEP - 1)];
   const Eigen::Vector2f step = ((end - start) / samples).cast<float>();
   const Eigen::Vector2f first = start.cast<float>() + 0.5F * step;
-  float total = 0.0F;
-  for (int i = 0; i < samples; ++i)
-  {
-    const float u = first.x() + static_cast<float>(i) * step.x();
-    const float v = first.y() + static_cast<float>(i) * step.y();
-    const float intensity = image.at(u, v);
-    intensities[i] = intensity;
-    total += intensity;
-    const float* b = basis.row(i);
-    for (int c = 0; c < Coefficients; ++c)
-    {
-      sums[c] += intensity * b[c];
-    }
-  }
-  const float mean = total / static_cast<float>(samples);
-  float contrast = 0.0F;
-  for (int i = 0; i < samples; ++i)
-  {
-    contrast = std::max(contrast, std::abs(intensities[i] - mean));
-  }
+  Eigen::Array<float, MAX_SAMPLES, 1> intensities;
+  image.alongLine(first, step, samples, intensities.data());
+  const auto sampled = intensities.head(samples);
+  const float mean = sampled.sum() / static_cast<float>(samples);
+  const float contrast = std::max(sampled.maxCoeff() - mean, mean - sampled.minCoeff());
   if (static_cast<double>(contrast) < min_contrast)
   {
     return false;
   }
-  for (int c = 0; c < Coefficients; ++c)
+  Basis::Row even = -mean * basis.evenSum();
+  Basis::Row odd = Basis::Row::Zero();
+  for (int i = 0; i < samples / 2; ++i)
   {
-    features[c] = (sums[c] - mean * basis.sum(c)) / contrast;
+    const float before = intensities[i];
+    const float after = intensities[samples - 1 - i];
+    even += (before + after) * basis.even(i);
+    odd += (before - after) * basis.odd(i);
+  }
+  for (int c = 0; c < coefficients; ++c)
+  {
+    features[c] = (reversalSign(c) > 0.0F ? even : odd)[c / 2] / contrast;
   }
   return true;
-}
-
-bool describe(const BilinearSampler& image, const Eigen::Vector2d& start, const Eigen::Vector2d& end, int coefficients,
-              const std::vector<Basis>& tables, double min_contrast, float* features)
-{
-  const int samples = sampleCount((end - start).norm());
-  const Basis& basis = tables[static_cast<std::size_t>(samples / SAMPLE_STEP - 1)];
-  switch (coefficients)
-  {
-    case 4:
-      return describe<4>(image, start, end, samples, basis, min_contrast, features);
-    case 6:
-      return describe<6>(image, start, end, samples, basis, min_contrast, features);
-    default:
-      return describe<8>(image, start, end, samples, basis, min_contrast, features);
-  }
 }
 
 void requireGrey(const cv::Mat& image)
@@ -135,43 +134,153 @@ void requireGrey(const cv::Mat& image)
   }
 }
 
+/** Corners by where they are, so that those near a place are found without a look at all others. */
+class CornerGrid
+{
+public:
+  explicit CornerGrid(const std::vector<Corner>& corners)
+  {
+    constexpr double CORNERS_A_CELL = 6.0;  // on average
+    Eigen::AlignedBox2d box;
+    for (const Corner& corner : corners)
+    {
+      box.extend(corner.position);
+    }
+    const Eigen::Vector2d size = corners.empty() ? Eigen::Vector2d(0.0, 0.0) : Eigen::Vector2d(box.sizes());
+    low_ = corners.empty() ? Eigen::Vector2d(0.0, 0.0) : box.min();
+    // Where all lie on a line, cells are as long as if there were a narrow strip.
+    const double area = std::max(size.x(), 1.0) * std::max(size.y(), 1.0);
+    cell_ =
+        std::max(1.0, std::sqrt(area * CORNERS_A_CELL / static_cast<double>(std::max<std::size_t>(1, corners.size()))));
+    columns_ = static_cast<int>(size.x() / cell_) + 1;
+    rows_ = static_cast<int>(size.y() / cell_) + 1;
+    cells_.resize(static_cast<std::size_t>(columns_) * static_cast<std::size_t>(rows_));
+    for (std::size_t i = 0; i < corners.size(); ++i)
+    {
+      const auto [column, row] = cellOf(corners[i].position);
+      cells_[static_cast<std::size_t>(row) * static_cast<std::size_t>(columns_) + static_cast<std::size_t>(column)]
+          .push_back(i);
+    }
+  }
+
+  /**
+   * Calls visit(number) for all corners up to a distance, and for some that are farther away [px].
+   * @return whether these are all corners.
+   */
+  template <typename Visit>
+  bool visitNear(const Eigen::Vector2d& place, double distance, const Visit& visit) const
+  {
+    const auto [left, top] = cellOf(place - Eigen::Vector2d(distance, distance));
+    const auto [right, bottom] = cellOf(place + Eigen::Vector2d(distance, distance));
+    for (int row = top; row <= bottom; ++row)
+    {
+      for (int column = left; column <= right; ++column)
+      {
+        for (const std::size_t i : cells_[static_cast<std::size_t>(row) * static_cast<std::size_t>(columns_) +
+                                          static_cast<std::size_t>(column)])
+        {
+          visit(i);
+        }
+      }
+    }
+    return left == 0 && top == 0 && right == columns_ - 1 && bottom == rows_ - 1;
+  }
+
+  double cell() const
+  {
+    return cell_;
+  }
+
+private:
+  /** Of the nearest cell, column and row. */
+  std::pair<int, int> cellOf(const Eigen::Vector2d& place) const
+  {
+    const Eigen::Vector2d offset = (place - low_) / cell_;
+    return { static_cast<int>(std::clamp(offset.x(), 0.0, columns_ - 1.0)),
+             static_cast<int>(std::clamp(offset.y(), 0.0, rows_ - 1.0)) };
+  }
+
+  Eigen::Vector2d low_;
+  double cell_ = 1.0;  // side [px]
+  int columns_ = 1;
+  int rows_ = 1;
+  std::vector<std::vector<std::size_t>> cells_;
+};
+
+/** Another corner and its squared distance [px^2]. */
+using NearCorner = std::pair<double, std::size_t>;
+
+/** Sets the other corners that a corner is paired with, in any order. */
+void selectPartners(const std::vector<Corner>& corners, const CornerGrid& grid, std::size_t corner,
+                    const ProfileParams& params, std::vector<NearCorner>& partners)
+{
+  const bool nearest = params.selection == PairSelection::NEAREST;
+  const double min_squared = params.min_length * params.min_length;
+  const Eigen::Vector2d& place = corners[corner].position;
+  // Of the nearest it is not known how far away they are: as many as are in a few cells, or as far as was found there.
+  double distance = nearest ? 1.5 * grid.cell() : params.max_length;
+  while (true)
+  {
+    partners.clear();
+    const bool all = grid.visitNear(place, distance, [&](std::size_t other) {
+      const double squared = (corners[other].position - place).squaredNorm();
+      if (squared >= min_squared && (nearest || squared <= params.max_length * params.max_length))
+      {
+        partners.emplace_back(squared, other);
+      }
+    });
+    if (!nearest)
+    {
+      return;
+    }
+    const auto wanted = static_cast<std::size_t>(params.neighbours);
+    if (partners.size() > wanted)
+    {
+      const auto last = partners.begin() + static_cast<std::ptrdiff_t>(wanted - 1);
+      std::nth_element(partners.begin(), last, partners.end());
+      const double farthest = std::sqrt(last->first);
+      if (all || farthest <= distance)
+      {
+        partners.resize(wanted);
+        return;
+      }
+      distance = farthest;
+      continue;
+    }
+    if (all)
+    {
+      return;
+    }
+    distance *= 2.0;
+  }
+}
+
 /** Unordered pairs by the selection of the parameters, start < end, sorted. */
 std::vector<ProfileSet::Pair> selectPairs(const std::vector<Corner>& corners, const ProfileParams& params)
 {
   const std::size_t n = corners.size();
-  const double min_squared = params.min_length * params.min_length;
-  const double max_squared = params.selection == PairSelection::RADIUS ? params.max_length * params.max_length
-                                                                       : std::numeric_limits<double>::infinity();
-  const std::size_t limit =
-      params.selection == PairSelection::NEAREST ? static_cast<std::size_t>(params.neighbours) : n;
-  std::vector<char> chosen(n * n, 0);  // row i: the corners that i is paired with
+  const CornerGrid grid(corners);
+  std::vector<std::vector<NearCorner>> partners(n);
   cv::parallel_for_(cv::Range(0, static_cast<int>(n)), [&](const cv::Range& range) {
-    std::vector<std::pair<double, std::size_t>> near;
-    for (std::size_t i = static_cast<std::size_t>(range.start); i < static_cast<std::size_t>(range.end); ++i)
+    for (int i = range.start; i < range.end; ++i)
     {
-      near.clear();
-      for (std::size_t j = 0; j < n; ++j)
-      {
-        const double squared = (corners[j].position - corners[i].position).squaredNorm();
-        if (squared >= min_squared && squared <= max_squared)
-        {
-          near.emplace_back(squared, j);
-        }
-      }
-      const std::size_t wanted = std::min(near.size(), limit);
-      std::nth_element(near.begin(), near.begin() + static_cast<std::ptrdiff_t>(wanted), near.end());
-      for (std::size_t k = 0; k < wanted; ++k)
-      {
-        chosen[i * n + near[k].second] = 1;
-      }
+      selectPartners(corners, grid, static_cast<std::size_t>(i), params, partners[static_cast<std::size_t>(i)]);
     }
   });
+  std::vector<char> paired(n * n, 0);  // row: the smaller number
+  for (std::size_t i = 0; i < n; ++i)
+  {
+    for (const auto& [squared, j] : partners[i])
+    {
+      paired[std::min(i, j) * n + std::max(i, j)] = 1;
+    }
+  }
   std::vector<ProfileSet::Pair> pairs;
   for (std::size_t i = 0; i < n; ++i)
   {
     for (std::size_t j = i + 1; j < n; ++j)
     {
-      if (chosen[i * n + j] != 0 || chosen[j * n + i] != 0)
+      if (paired[i * n + j] != 0)
       {
         pairs.push_back({ static_cast<int>(i), static_cast<int>(j) });
       }
@@ -240,7 +349,6 @@ ProfileSet extractProfiles(const cv::Mat& image, const std::vector<Corner>& corn
   const std::size_t columns = static_cast<std::size_t>(params.coefficients);
   std::vector<float> features(pairs.size() * columns);
   std::vector<char> described(pairs.size(), 0);
-  const std::vector<Basis> tables = basisTables(params.coefficients);
   const BilinearSampler sampler(image);
   cv::parallel_for_(cv::Range(0, static_cast<int>(pairs.size())), [&](const cv::Range& range) {
     for (int i = range.start; i < range.end; ++i)
@@ -248,21 +356,24 @@ ProfileSet extractProfiles(const cv::Mat& image, const std::vector<Corner>& corn
       const std::size_t k = static_cast<std::size_t>(i);
       const Eigen::Vector2d& start = corners[static_cast<std::size_t>(pairs[k].start)].position;
       const Eigen::Vector2d& end = corners[static_cast<std::size_t>(pairs[k].end)].position;
-      const bool good = sampler.contains(start.x(), start.y()) && sampler.contains(end.x(), end.y()) &&
-                        describe(sampler, start, end, params.coefficients, tables, params.min_contrast,
-                                 features.data() + k * columns);
+      const bool good =
+          sampler.contains(start.x(), start.y()) && sampler.contains(end.x(), end.y()) &&
+          describe(sampler, start, end, params.coefficients, params.min_contrast, features.data() + k * columns);
       described[k] = good ? 1 : 0;
     }
   });
+  // In place: what is kept never overtakes what is read.
   for (std::size_t k = 0; k < pairs.size(); ++k)
   {
     if (described[k] != 0)
     {
+      std::copy_n(features.begin() + static_cast<std::ptrdiff_t>(k * columns), columns,
+                  features.begin() + static_cast<std::ptrdiff_t>(set.pairs.size() * columns));
       set.pairs.push_back(pairs[k]);
-      set.features.insert(set.features.end(), features.begin() + static_cast<std::ptrdiff_t>(k * columns),
-                          features.begin() + static_cast<std::ptrdiff_t>((k + 1) * columns));
     }
   }
+  features.resize(set.pairs.size() * columns);
+  set.features = std::move(features);
   normalize(set);
   return set;
 }
@@ -276,8 +387,7 @@ bool profileFeatures(const cv::Mat& image, const Eigen::Vector2d& start, const E
   {
     return false;
   }
-  return describe(sampler, start, end, params.coefficients, basisTables(params.coefficients), params.min_contrast,
-                  features);
+  return describe(sampler, start, end, params.coefficients, params.min_contrast, features);
 }
 
 }  // namespace view_servo

@@ -174,6 +174,44 @@ TEST_F(ProfileSets, HoldEachPairOnceWithinTheLimits)
   EXPECT_GT(radius.pairs.size(), within * 9 / 10);  // all but those without contrast
 }
 
+TEST_F(ProfileSets, PairEachCornerWithAllOfItsNearest)
+{
+  const cv::Mat noisy = view_servo::test::disturbed(picture_, 1.0, 0.0, 3.0);  // nothing is without contrast
+  std::vector<Corner> corners = corners_;
+  corners.resize(200);
+  for (const int neighbours : { 1, 15, 100, 1000 })
+  {
+    ProfileParams params;
+    params.neighbours = neighbours;
+    params.min_contrast = 0.01;
+    std::set<std::pair<int, int>> expected;
+    for (int i = 0; i < 200; ++i)
+    {
+      std::vector<std::pair<double, int>> others;
+      for (int j = 0; j < 200; ++j)
+      {
+        const double length = (corners[i].position - corners[j].position).norm();
+        if (length >= params.min_length)
+        {
+          others.emplace_back(length, j);
+        }
+      }
+      std::sort(others.begin(), others.end());
+      others.resize(std::min<std::size_t>(others.size(), static_cast<std::size_t>(neighbours)));
+      for (const auto& [length, j] : others)
+      {
+        expected.emplace(std::min(i, j), std::max(i, j));
+      }
+    }
+    std::set<std::pair<int, int>> found;
+    for (const ProfileSet::Pair& pair : extractProfiles(noisy, corners, params).pairs)
+    {
+      found.emplace(pair.start, pair.end);
+    }
+    EXPECT_EQ(found, expected) << neighbours << " neighbours";
+  }
+}
+
 TEST_F(ProfileSets, HaveUnitDeviationAndZeroMean)
 {
   for (const int coefficients : { 4, 6, 8 })

@@ -6,7 +6,9 @@
 #include <opencv2/core.hpp>
 
 #include <cmath>
+#include <cstddef>
 #include <limits>
+#include <vector>
 
 namespace view_servo
 {
@@ -44,6 +46,25 @@ TEST(BilinearSampler, InterpolatesBetweenFourPixels)
   // A difference may be negative.
   const cv::Mat falling = (cv::Mat_<unsigned char>(2, 2) << 255, 0, 255, 0);
   EXPECT_FLOAT_EQ(BilinearSampler(falling).at(0.2F, 0.5F), 204.0F);
+}
+
+TEST(BilinearSampler, ReadsAlongALineWhatItReadsAtEachPlace)
+{
+  const cv::Mat image = randomImage(40, 60);
+  const BilinearSampler sampler(image(cv::Rect(3, 2, 50, 30)));
+  const Eigen::Vector2f first(2.3F, 25.8F);
+  const Eigen::Vector2f step(0.7F, -0.41F);
+  for (const int count : { 0, 1, 4, 7, 48 })
+  {
+    std::vector<float> values(static_cast<std::size_t>(count) + 1, -1.0F);
+    sampler.alongLine(first, step, count, values.data());
+    for (int i = 0; i < count; ++i)
+    {
+      const Eigen::Vector2f place = first + static_cast<float>(i) * step;
+      EXPECT_NEAR(values[static_cast<std::size_t>(i)], sampler.at(place.x(), place.y()), 0.01F) << i << " of " << count;
+    }
+    EXPECT_EQ(values.back(), -1.0F);
+  }
 }
 
 TEST(BilinearSampler, ReadsPartsOfImages)

@@ -2,6 +2,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <Eigen/Core>
 #include <opencv2/core/mat.hpp>
 
 #include <cstddef>
@@ -46,6 +47,9 @@ public:
     const float below = static_cast<float>(q[0]) + fu * static_cast<float>(q[1] - q[0]);
     return above + fv * (below - above);
   }
+
+  /** at() at `count` places, first + i step; `values` has to hold so many. */
+  void alongLine(const Eigen::Vector2f& first, const Eigen::Vector2f& step, int count, float* values) const;
 
 private:
   const unsigned char* data_;
