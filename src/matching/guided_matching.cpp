@@ -4,13 +4,17 @@
 
 #include "view_servo/geometry/fundamental.h"
 #include "view_servo/geometry/homography.h"
+#include "view_servo/images/sampling.h"
 
 #include <Eigen/Geometry>
 #include <Eigen/LU>
 #include <opencv2/core.hpp>
+#include <opencv2/core/hal/intrin.hpp>
 
 #include <algorithm>
 #include <cmath>
+#include <cstddef>
+#include <cstdint>
 #include <optional>
 #include <utility>
 
@@ -26,86 +30,162 @@ Eigen::Matrix2d affineApproximation(const Eigen::Matrix3d& h, const Eigen::Vecto
   return (h.topLeftCorner<2, 2>() - image * h.bottomLeftCorner<1, 2>()) / mapped.z();
 }
 
-/** A reference patch drawn in the pixels of the current image, with zero mean and unit norm. */
+/** A reference patch drawn in the pixels of the current image, with zero mean and, as integers, nearly unit norm. */
 class Template
 {
 public:
   explicit Template(int radius)
-    : radius_(radius), values_(static_cast<std::size_t>(2 * radius + 1) * static_cast<std::size_t>(2 * radius + 1))
+    : radius_(radius),
+      side_(2 * radius + 1),
+      stride_(cv::alignSize(static_cast<std::size_t>(side_), LANES)),
+      drawn_(static_cast<std::size_t>(side_) * static_cast<std::size_t>(side_)),
+      values_(static_cast<std::size_t>(side_) * stride_, 0)
   {
   }
+
+  static constexpr int LANES = 8;  // numbers of 16 bits that are multiplied at once
 
   /** @param to_reference maps offsets in the current image to offsets in the reference. False: leaves it, or is flat. */
   bool draw(const cv::Mat& reference, const Eigen::Vector2d& at, const Eigen::Matrix2d& to_reference)
   {
-    const double reach = (to_reference.cwiseAbs() * Eigen::Vector2d(radius_, radius_)).maxCoeff();
+    constexpr double ROUNDING = 0.01;  // of places in single precision [px]
+    const double reach = (to_reference.cwiseAbs() * Eigen::Vector2d(radius_, radius_)).maxCoeff() + ROUNDING;
     if (!(at.x() - reach >= 0.0 && at.y() - reach >= 0.0 && at.x() + reach < reference.cols - 1.0 &&
           at.y() + reach < reference.rows - 1.0))
     {
       return false;
     }
-    float sum = 0.0F;
-    float squares = 0.0F;
-    std::size_t i = 0;
-    for (int dv = -radius_; dv <= radius_; ++dv)
+    const BilinearSampler sampler(reference);
+    const Eigen::Vector2f middle = at.cast<float>();
+    const Eigen::Matrix2f map = to_reference.cast<float>();
+    const auto side = static_cast<std::size_t>(side_);
+    for (int v = 0; v < side_; ++v)
     {
-      for (int du = -radius_; du <= radius_; ++du, ++i)
-      {
-        const Eigen::Vector2f x = (at + to_reference * Eigen::Vector2d(du, dv)).cast<float>();
-        const int u = static_cast<int>(x.x());
-        const int v = static_cast<int>(x.y());
-        const float fx = x.x() - static_cast<float>(u);
-        const float fy = x.y() - static_cast<float>(v);
-        const unsigned char* p = reference.ptr<unsigned char>(v) + u;
-        const unsigned char* q = reference.ptr<unsigned char>(v + 1) + u;
-        const float upper = static_cast<float>(p[0]) + fx * static_cast<float>(p[1] - p[0]);
-        const float lower = static_cast<float>(q[0]) + fx * static_cast<float>(q[1] - q[0]);
-        values_[i] = upper + fy * (lower - upper);
-        sum += values_[i];
-        squares += values_[i] * values_[i];
-      }
+      const Eigen::Vector2f first =
+          middle + static_cast<float>(v - radius_) * map.col(1) - static_cast<float>(radius_) * map.col(0);
+      sampler.alongLine(first, map.col(0), side_, drawn_.data() + static_cast<std::size_t>(v) * side);
     }
-    const float count = static_cast<float>(values_.size());
-    const float variance = squares - sum * sum / count;
+    const Eigen::Map<const Eigen::ArrayXf> drawn(drawn_.data(), static_cast<Eigen::Index>(drawn_.size()));
+    const float count = static_cast<float>(drawn_.size());
+    const float mean = drawn.mean();
+    const float variance = (drawn - mean).square().sum();
     if (!(variance > count))  // less than one grey level of deviation
     {
       return false;
     }
-    const float scale = 1.0F / std::sqrt(variance);
-    for (float& value : values_)
+    // As large as sums of products with grey levels may be in 32 bits.
+    const float largest = std::min(4095.0F, 2147483647.0F / (255.0F * count));
+    const float scale = largest / std::max(drawn.maxCoeff() - mean, mean - drawn.minCoeff());
+    sum_ = 0;
+    for (std::size_t v = 0; v < side; ++v)
     {
-      value = (value - sum / count) * scale;
+      for (std::size_t u = 0; u < side; ++u)
+      {
+        const int value = cvRound(scale * (drawn_[v * side + u] - mean));
+        values_[v * stride_ + u] = static_cast<short>(value);
+        sum_ += value;
+      }
     }
+    to_unit_ = 1.0F / (scale * std::sqrt(variance));
     return true;
   }
 
-  /** Correlation, in [-1, 1], with the patch around a pixel of the current image, which must contain it; 0 if flat. */
-  float correlate(const cv::Mat& current, int u, int v) const
+  /** Sum of the products with the window of numbers of the same size that begins there; its rows are `stride` apart. */
+  int product(const short* window, std::size_t stride) const
   {
-    const int side = 2 * radius_ + 1;
-    float product = 0.0F;
-    int sum = 0;
-    int squares = 0;
-    const float* value = values_.data();
-    for (int dv = -radius_; dv <= radius_; ++dv, value += side)
+    cv::v_int32x4 sums = cv::v_setzero_s32();
+    const short* row = values_.data();
+    for (int v = 0; v < side_; ++v, row += stride_, window += stride)
     {
-      const unsigned char* row = current.ptr<unsigned char>(v + dv) + (u - radius_);
-      for (int i = 0; i < side; ++i)
+      for (std::size_t u = 0; u < stride_; u += LANES)
       {
-        const int intensity = row[i];
-        product += value[i] * static_cast<float>(intensity);
-        sum += intensity;
-        squares += intensity * intensity;
+        sums = cv::v_dotprod(cv::v_load(row + u), cv::v_load(window + u), sums);
       }
     }
-    const float count = static_cast<float>(side * side);
-    const float variance = static_cast<float>(squares) - static_cast<float>(sum) * static_cast<float>(sum) / count;
-    return variance > count ? product / std::sqrt(variance) : 0.0F;
+    return cv::v_reduce_sum(sums);
+  }
+
+  /** Correlation, in about [-1, 1], where such a window has that product, sum and sum of squares; 0 if it is flat. */
+  float correlation(int product, std::uint32_t sum, std::uint32_t squares) const
+  {
+    const float count = static_cast<float>(side_ * side_);
+    const float mean = static_cast<float>(sum) / count;
+    const float variance = static_cast<float>(squares) - static_cast<float>(sum) * mean;
+    const float rest = static_cast<float>(sum_) * mean;  // as rounded values have a mean
+    return variance > count ? (static_cast<float>(product) - rest) * to_unit_ / std::sqrt(variance) : 0.0F;
   }
 
 private:
   int radius_;
-  std::vector<float> values_;
+  int side_;
+  std::size_t stride_;  // of rows, the rest of which is zero
+  std::vector<float> drawn_;
+  std::vector<short> values_;
+  int sum_ = 0;           // of the values
+  float to_unit_ = 0.0F;  // times the values: of unit norm
+};
+
+/** Part of an image around a place: its grey levels, and their sums over windows of one size. */
+class SearchArea
+{
+public:
+  /** @param side of the area. @param window side of the windows [px]. */
+  SearchArea(int side, int window)
+    : side_(side),
+      window_(window),
+      stride_(static_cast<std::size_t>(side) + Template::LANES),
+      values_(static_cast<std::size_t>(side) * stride_ + Template::LANES, 0),
+      sums_(static_cast<std::size_t>(side + 1) * static_cast<std::size_t>(side + 1), 0),
+      squares_(sums_.size(), 0)
+  {
+  }
+
+  /** @param u, v of its first pixel; the image has to contain the area. */
+  void take(const cv::Mat& image, int u, int v)
+  {
+    const auto width = static_cast<std::size_t>(side_) + 1;
+    for (int dv = 0; dv < side_; ++dv)
+    {
+      const unsigned char* from = image.ptr<unsigned char>(v + dv) + u;
+      short* to = values_.data() + static_cast<std::size_t>(dv) * stride_;
+      const std::size_t above = static_cast<std::size_t>(dv) * width;
+      std::uint32_t sum = 0;
+      std::uint32_t square = 0;
+      for (std::size_t du = 0; du < static_cast<std::size_t>(side_); ++du)
+      {
+        const std::uint32_t grey = from[du];
+        to[du] = static_cast<short>(grey);
+        sum += grey;
+        square += grey * grey;
+        sums_[above + width + du + 1] = sums_[above + du + 1] + sum;
+        squares_[above + width + du + 1] = squares_[above + du + 1] + square;
+      }
+    }
+  }
+
+  float correlation(const Template& patch, int u, int v) const
+  {
+    const int product = patch.product(values_.data() + static_cast<std::size_t>(v) * stride_ + u, stride_);
+    return patch.correlation(product, within(sums_, u, v), within(squares_, u, v));
+  }
+
+private:
+  /** Also where sums over the whole area overflow, those over a window do not. */
+  std::uint32_t within(const std::vector<std::uint32_t>& integral, int u, int v) const
+  {
+    const auto width = static_cast<std::size_t>(side_) + 1;
+    const std::size_t top = static_cast<std::size_t>(v) * width + static_cast<std::size_t>(u);
+    const std::size_t bottom = top + static_cast<std::size_t>(window_) * width;
+    const auto across = static_cast<std::size_t>(window_);
+    return integral[bottom + across] - integral[bottom] - integral[top + across] + integral[top];
+  }
+
+  int side_;
+  int window_;
+  std::size_t stride_;  // of rows, longer than them as whole vectors are read
+  std::vector<short> values_;
+  std::vector<std::uint32_t> sums_;  // of all above and to the left
+  std::vector<std::uint32_t> squares_;
 };
 
 /** Offset of a parabola's vertex through values at -1, 0, 1, of which the middle one is the largest. */
@@ -140,6 +220,7 @@ std::vector<GuidedMatch> searchAlongHomography(const cv::Mat& reference, const s
   std::vector<std::optional<GuidedMatch>> found(corners.size());
   cv::parallel_for_(cv::Range(0, static_cast<int>(corners.size())), [&](const cv::Range& range) {
     Template patch(params.patch_radius);
+    SearchArea area(side + 2 * params.patch_radius, 2 * params.patch_radius + 1);
     std::vector<float> correlations(static_cast<std::size_t>(side) * static_cast<std::size_t>(side));
     for (int i = range.start; i < range.end; ++i)
     {
@@ -157,9 +238,10 @@ std::vector<GuidedMatch> searchAlongHomography(const cv::Mat& reference, const s
       }
       const int u0 = static_cast<int>(std::lround(predicted.x())) - reach;
       const int v0 = static_cast<int>(std::lround(predicted.y())) - reach;
+      area.take(current, u0 - params.patch_radius, v0 - params.patch_radius);
       for (int k = 0; k < side * side; ++k)
       {
-        correlations[static_cast<std::size_t>(k)] = patch.correlate(current, u0 + k % side, v0 + k / side);
+        correlations[static_cast<std::size_t>(k)] = area.correlation(patch, k % side, k / side);
       }
       const auto best = std::max_element(correlations.begin(), correlations.end());
       const int k = static_cast<int>(best - correlations.begin());

@@ -61,6 +61,28 @@ TEST_F(SearchAlongHomography, FindsCornersToAFractionOfAPixel)
   }
 }
 
+TEST_F(SearchAlongHomography, FindsAPatchWhereItIsItself)
+{
+  std::vector<Corner> corners = corners_;
+  for (Corner& corner : corners)
+  {
+    corner.position = corner.position.array().round();
+  }
+  for (const int radius : { 3, 7, 20 })
+  {
+    GuidedParams params;
+    params.patch_radius = radius;
+    const std::vector<GuidedMatch> matches =
+        searchAlongHomography(reference_, corners, reference_, Eigen::Matrix3d::Identity(), 3.0, params);
+    ASSERT_GT(matches.size(), corners.size() / 3) << radius;
+    for (const GuidedMatch& match : matches)
+    {
+      EXPECT_GT(match.correlation, 0.9995) << radius;
+      EXPECT_LT((match.current - corners[static_cast<std::size_t>(match.reference)].position).norm(), 0.3) << radius;
+    }
+  }
+}
+
 TEST_F(SearchAlongHomography, CorrectsAPredictionThatIsOff)
 {
   Eigen::Matrix3d off = Eigen::Matrix3d::Identity();
