@@ -9,6 +9,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <limits>
+#include <utility>
 #include <vector>
 
 namespace view_servo
@@ -44,11 +45,12 @@ public:
     }
     bounds_ = boundsOf(vectors, 0, index_.size());
     build(vectors, 0, index_.size());
-    vectors_.reserve(vectors.size());
-    for (const std::uint32_t i : index_)
+    for (Node& node : nodes_)
     {
-      const auto begin = vectors.begin() + static_cast<std::ptrdiff_t>(i) * Columns;
-      vectors_.insert(vectors_.end(), begin, begin + Columns);
+      if (node.column < 0)
+      {
+        storeLeaf(vectors, node);
+      }
     }
   }
 
@@ -61,6 +63,21 @@ public:
     found.clear();
     Nearest nearest{ wanted, found };
     search(query, (1.0F + tolerance) * (1.0F + tolerance), nearest);
+  }
+
+  /** The vectors, in no order, of the leaf that the query falls in: from the first of two pointers to before the second. */
+  std::pair<const std::uint32_t*, const std::uint32_t*> leafOf(const float* query) const
+  {
+    if (nodes_.empty())
+    {
+      return { nullptr, nullptr };
+    }
+    std::size_t number = 0;
+    while (nodes_[number].column >= 0)
+    {
+      number = leftIsNearer(nodes_[number], query) ? number + 1 : nodes_[number].right;
+    }
+    return { index_.data() + nodes_[number].begin, index_.data() + nodes_[number].end };
   }
 
   /** All nearer than a radius, nearest first. */
@@ -76,7 +93,9 @@ public:
 private:
   using Vector = Eigen::Matrix<float, Columns, 1>;
   using Map = Eigen::Map<const Vector>;
-  static constexpr std::size_t LEAF_SIZE = 32;
+  using Group = Eigen::Array<float, 4, Columns>;  // of vectors, a row each, whose distances are computed at once
+  using Distances = Eigen::Array<float, 4, 1>;
+  static constexpr std::size_t LEAF_SIZE = 12;
 
   struct Bounds
   {
@@ -91,8 +110,9 @@ private:
     float left_high = 0.0F;   // largest number of that column on the left, ...
     float right_low = 0.0F;   // ... and smallest on the right
     std::uint32_t right = 0;  // child
-    std::uint32_t begin = 0;  // of a leaf's vectors
+    std::uint32_t begin = 0;  // of a leaf's vectors in index_, ...
     std::uint32_t end = 0;
+    std::uint32_t group = 0;  // ... and of the groups that hold them
   };
 
   /** Collects the nearest, sorted. */
@@ -198,6 +218,49 @@ private:
     build(vectors, border, end);
   }
 
+  /** Appends the groups of a leaf; what is missing in the last one is infinitely far from all. */
+  void storeLeaf(const std::vector<float>& vectors, Node& leaf)
+  {
+    leaf.group = static_cast<std::uint32_t>(groups_.size());
+    for (std::size_t i = leaf.begin; i < leaf.end; i += 4)
+    {
+      groups_.emplace_back(Group::Constant(std::numeric_limits<float>::infinity()));
+      for (std::size_t k = i; k < std::min<std::size_t>(i + 4, leaf.end); ++k)
+      {
+        groups_.back().row(static_cast<Eigen::Index>(k - i)) =
+            Map(vectors.data() + static_cast<std::size_t>(index_[k]) * Columns).transpose();
+      }
+    }
+  }
+
+  static bool leftIsNearer(const Node& node, const float* query)
+  {
+    const float value = query[static_cast<std::size_t>(node.column)];
+    return value - node.left_high < node.right_low - value;
+  }
+
+  template <typename Collector>
+  void takeLeaf(const Node& leaf, const float* query, Collector& collector) const
+  {
+    std::size_t group = leaf.group;
+    for (std::size_t i = leaf.begin; i < leaf.end; i += 4, ++group)
+    {
+      const Group& vectors = groups_[group];
+      Distances distances = Distances::Zero();
+      for (int c = 0; c < Columns; ++c)
+      {
+        distances += (vectors.col(c) - query[c]).square();
+      }
+      for (int k = 0; k < 4; ++k)
+      {
+        if (distances[k] < collector.reach())
+        {
+          collector.take(index_[i + static_cast<std::size_t>(k)], distances[k]);
+        }
+      }
+    }
+  }
+
   template <typename Collector>
   void search(const float* query, float squared_factor, Collector& collector) const
   {
@@ -223,21 +286,13 @@ private:
     const Node& node = nodes_[number];
     if (node.column < 0)
     {
-      const Map wanted(query);
-      for (std::size_t i = node.begin; i < node.end; ++i)
-      {
-        const float distance = (Map(vectors_.data() + i * Columns) - wanted).squaredNorm();
-        if (distance < collector.reach())
-        {
-          collector.take(index_[i], distance);
-        }
-      }
+      takeLeaf(node, query, collector);
       return;
     }
     const std::size_t column = static_cast<std::size_t>(node.column);
     const float beyond_left = query[column] - node.left_high;
     const float before_right = node.right_low - query[column];
-    const bool left_first = beyond_left < before_right;
+    const bool left_first = leftIsNearer(node, query);
     const float offset = left_first ? before_right : beyond_left;
     descend(left_first ? number + 1 : node.right, query, squared_factor, squared_distance, offsets, collector);
     const float before = offsets[column];
@@ -250,8 +305,8 @@ private:
     }
   }
 
-  std::vector<std::uint32_t> index_;  // of the vectors, in the order of the leaves
-  std::vector<float> vectors_;        // in the same order
+  std::vector<std::uint32_t> index_;                            // of the vectors, in the order of the leaves
+  std::vector<Group, Eigen::aligned_allocator<Group>> groups_;  // the vectors in the same order
   std::vector<Node> nodes_;
   Bounds bounds_{};
 };

@@ -10,6 +10,7 @@
 #include <cmath>
 #include <cstdint>
 #include <numeric>
+#include <stdexcept>
 #include <utility>
 
 namespace view_servo
@@ -24,36 +25,40 @@ struct Vote
   float correlation;
 };
 
-/** Calls visit(row, column, reference neighbour, current neighbour) for both ends of two matched profiles. */
+/** Calls visit(row, column, reference direction, current direction) for both ends of two matched profiles. */
 template <typename Visit>
-void visitEnds(const ProfileSet::Pair& reference, const ProfileSet::Pair& current, bool reversed, const Visit& visit)
+void visitEnds(const PointFeatures& reference, const ProfileMatch& match, const PointFeatures& current,
+               std::size_t profile, const Visit& visit)
 {
-  const int start = reversed ? reference.end : reference.start;
-  const int end = reversed ? reference.start : reference.end;
-  visit(start, current.start, end, current.end);
-  visit(end, current.end, start, current.start);
-}
-
-float correlation(const float* a, const float* b, int columns, bool reversed)
-{
-  float ab = 0.0F;
-  float aa = 0.0F;
-  float bb = 0.0F;
-  for (int c = 0; c < columns; ++c)
+  ProfileEnds from = reference.ends[static_cast<std::size_t>(match.reference)];
+  const ProfileEnds& to = current.ends[profile];
+  if (match.reversed)
   {
-    const float value = reversed ? a[c] * reversalSign(c) : a[c];
-    ab += value * b[c];
-    aa += value * value;
-    bb += b[c] * b[c];
+    std::swap(from.from_start, from.from_end);
   }
-  const float norm = std::sqrt(aa * bb);
-  return norm > 0.0F ? ab / norm : 0.0F;
+  visit(from.start(), to.start(), from.from_start, to.from_start);
+  visit(from.end(), to.end(), from.from_end, to.from_end);
 }
 
-/**
- * A number that orders the profiles around a corner by their angle, and differs for different neighbours: the upper
- * half is the angle (as the monotonic and cheaper diamond angle, in 2^14 steps a quadrant), the lower the neighbour.
- */
+/** reversalSign() of each feature. */
+constexpr float SIGNS[] = { reversalSign(0), reversalSign(1), reversalSign(2), reversalSign(3),
+                            reversalSign(4), reversalSign(5), reversalSign(6), reversalSign(7) };
+
+float correlation(const PointFeatures& reference, const ProfileMatch& match, const PointFeatures& current,
+                  std::size_t profile)
+{
+  const auto r = static_cast<std::size_t>(match.reference);
+  const float* a = reference.profiles.feature(r);
+  const float* b = current.profiles.feature(profile);
+  float product = 0.0F;
+  for (int c = 0; c < current.profiles.coefficients; ++c)
+  {
+    product += match.reversed ? a[c] * b[c] * SIGNS[c] : a[c] * b[c];
+  }
+  return product * reference.ends[r].inverse_length * current.ends[profile].inverse_length;
+}
+
+/** See ProfileEnds. */
 std::uint32_t directionKey(const std::vector<Corner>& corners, int corner, int neighbour)
 {
   const Eigen::Vector2d d =
@@ -65,41 +70,78 @@ std::uint32_t directionKey(const std::vector<Corner>& corners, int corner, int n
   return steps << 16U | static_cast<std::uint32_t>(neighbour);
 }
 
-/** Marks, in a rows x columns matrix, the `count` largest positive entries of each row and of each column; 0 = all. */
-std::vector<char> strongestEntries(const std::vector<float>& matrix, std::size_t rows, std::size_t columns, int count)
+/** An entry of a matrix. */
+struct Entry
 {
-  std::vector<char> chosen(matrix.size(), 0);
-  // One pass over the rows, one over the columns; within a pass the lines share no entry.
-  const auto mark = [&](std::size_t lines, std::size_t length, std::size_t line_stride, std::size_t stride) {
-    cv::parallel_for_(cv::Range(0, static_cast<int>(lines)), [&](const cv::Range& range) {
-      std::vector<std::pair<float, std::size_t>> line;
-      for (std::size_t l = static_cast<std::size_t>(range.start); l < static_cast<std::size_t>(range.end); ++l)
-      {
-        line.clear();
-        for (std::size_t k = 0; k < length; ++k)
-        {
-          const std::size_t place = l * line_stride + k * stride;
-          if (matrix[place] > 0.0F)
-          {
-            line.emplace_back(-matrix[place], place);
-          }
-        }
-        const std::size_t wanted = count > 0 ? std::min(line.size(), static_cast<std::size_t>(count)) : line.size();
-        std::partial_sort(line.begin(), line.begin() + static_cast<std::ptrdiff_t>(wanted), line.end());
-        for (std::size_t k = 0; k < wanted; ++k)
-        {
-          chosen[line[k].second] = 1;
-        }
-      }
-    });
-  };
-  mark(rows, columns, columns, 1);
-  mark(columns, rows, 1, columns);
-  return chosen;
+  float value = 0.0F;
+  std::size_t place = 0;
+};
+
+/** Puts an entry among the largest of its row or column, largest first; it is larger than the last; those found first stay. */
+void addToLargest(const Entry& entry, Entry* largest, std::size_t count)
+{
+  std::size_t k = count - 1;
+  for (; k > 0 && largest[k - 1].value < entry.value; --k)
+  {
+    largest[k] = largest[k - 1];
+  }
+  largest[k] = entry;
 }
 
-/** For each current profile, the reference profiles similar to it. */
-using SimilarProfiles = std::vector<std::vector<ProfileMatch>>;
+/** The places, in order, of the `count` largest positive entries of each row and of each column of a matrix; 0 = of all. */
+std::vector<std::size_t> strongestEntries(const std::vector<float>& matrix, std::size_t rows, std::size_t columns,
+                                          int count)
+{
+  std::vector<std::size_t> places;
+  if (count == 0)
+  {
+    for (std::size_t place = 0; place < matrix.size(); ++place)
+    {
+      if (matrix[place] > 0.0F)
+      {
+        places.push_back(place);
+      }
+    }
+    return places;
+  }
+  const auto most = static_cast<std::size_t>(count);
+  std::vector<Entry> of_row(most);
+  std::vector<Entry> of_columns(columns * most);
+  std::vector<float> least_of_columns(columns, 0.0F);  // of those of a column
+  const auto take = [&](const std::vector<Entry>& entries) {
+    for (const Entry& entry : entries)
+    {
+      if (entry.value > 0.0F)
+      {
+        places.push_back(entry.place);
+      }
+    }
+  };
+  for (std::size_t row = 0; row < rows; ++row)
+  {
+    std::fill(of_row.begin(), of_row.end(), Entry());
+    const float* values = matrix.data() + row * columns;
+    for (std::size_t column = 0; column < columns; ++column)
+    {
+      const Entry entry{ values[column], row * columns + column };
+      if (entry.value > of_row.back().value)
+      {
+        addToLargest(entry, of_row.data(), most);
+      }
+      if (entry.value > least_of_columns[column])
+      {
+        Entry* of_column = of_columns.data() + column * most;
+        addToLargest(entry, of_column, most);
+        least_of_columns[column] = of_column[most - 1].value;
+      }
+    }
+    take(of_row);
+  }
+  take(of_columns);
+  std::sort(places.begin(), places.end());
+  places.erase(std::unique(places.begin(), places.end()), places.end());
+  return places;
+}
 
 /** The association by votes alone (eq. 7.3), rows x columns. */
 std::vector<float> countVotes(const PointFeatures& reference, const PointFeatures& current,
@@ -112,10 +154,9 @@ std::vector<float> countVotes(const PointFeatures& reference, const PointFeature
     const float vote = similar[p].empty() ? 0.0F : 1.0F / static_cast<float>(similar[p].size());
     for (const ProfileMatch& match : similar[p])
     {
-      visitEnds(reference.profiles.pairs[static_cast<std::size_t>(match.reference)], current.profiles.pairs[p],
-                match.reversed, [&](int row, int column, int, int) {
-                  votes[static_cast<std::size_t>(row) * columns + static_cast<std::size_t>(column)] += vote;
-                });
+      visitEnds(reference, match, current, p, [&](std::size_t row, std::size_t column, std::uint32_t, std::uint32_t) {
+        votes[row * columns + column] += vote;
+      });
     }
   }
   return votes;
@@ -128,13 +169,19 @@ struct GroupedVotes
   std::vector<std::size_t> begin;
 };
 
-/** Who voted for each of `count` entries; entry_of gives an entry's number, or -1, for each place of the matrix. */
+/** Who voted for each of the entries at `places` of the matrix of votes. */
 GroupedVotes groupVotes(const PointFeatures& reference, const PointFeatures& current, const SimilarProfiles& similar,
-                        const std::vector<int>& entry_of, std::size_t count, const PointMatcherParams& params)
+                        const std::vector<std::size_t>& places, const PointMatcherParams& params)
 {
+  const std::size_t columns = current.corners.size();
+  std::vector<int> entry_of(reference.corners.size() * columns, -1);
+  for (std::size_t e = 0; e < places.size(); ++e)
+  {
+    entry_of[places[e]] = static_cast<int>(e);
+  }
   // Parts of the profiles are gone through side by side and joined in their order: the result is that of one pass.
   constexpr std::size_t PARTS = 8;
-  std::vector<std::vector<std::pair<std::size_t, Vote>>> parts(PARTS);
+  std::vector<std::vector<std::pair<std::uint32_t, Vote>>> parts(PARTS);
   cv::parallel_for_(cv::Range(0, static_cast<int>(PARTS)), [&](const cv::Range& range) {
     for (std::size_t part = static_cast<std::size_t>(range.start); part < static_cast<std::size_t>(range.end); ++part)
     {
@@ -142,36 +189,30 @@ GroupedVotes groupVotes(const PointFeatures& reference, const PointFeatures& cur
       {
         for (const ProfileMatch& match : similar[p])
         {
-          const std::size_t r = static_cast<std::size_t>(match.reference);
           float weight = -1.0F;  // not yet computed
-          visitEnds(
-              reference.profiles.pairs[r], current.profiles.pairs[p], match.reversed,
-              [&](int row, int column, int row_neighbour, int column_neighbour) {
-                const int entry =
-                    entry_of[static_cast<std::size_t>(row) * current.corners.size() + static_cast<std::size_t>(column)];
-                if (entry < 0)
-                {
-                  return;
-                }
-                if (weight < 0.0F)
-                {
-                  weight = std::max(0.0F, correlation(reference.profiles.feature(r), current.profiles.feature(p),
-                                                      current.profiles.coefficients, match.reversed));
-                }
-                if (weight > 0.0F && static_cast<double>(weight) >= params.min_correlation)
-                {
-                  parts[part].push_back({ static_cast<std::size_t>(entry),
-                                          { directionKey(reference.corners, row, row_neighbour),
-                                            directionKey(current.corners, column, column_neighbour), weight } });
-                }
-              });
+          visitEnds(reference, match, current, p,
+                    [&](std::size_t row, std::size_t column, std::uint32_t from, std::uint32_t to) {
+                      const int entry = entry_of[row * columns + column];
+                      if (entry < 0)
+                      {
+                        return;
+                      }
+                      if (weight < 0.0F)
+                      {
+                        weight = std::max(0.0F, correlation(reference, match, current, p));
+                      }
+                      if (weight > 0.0F && static_cast<double>(weight) >= params.min_correlation)
+                      {
+                        parts[part].push_back({ static_cast<std::uint32_t>(entry), { from, to, weight } });
+                      }
+                    });
         }
       }
     }
   });
 
   GroupedVotes grouped;
-  grouped.begin.assign(count + 1, 0);
+  grouped.begin.assign(places.size() + 1, 0);
   for (const auto& part : parts)
   {
     for (const auto& [entry, vote] : part)
@@ -261,7 +302,27 @@ PointFeatures extractPointFeatures(const cv::Mat& image, const PointMatcherParam
   PointFeatures features;
   features.corners = detectCorners(image, params.corners, mask);
   features.profiles = extractProfiles(image, features.corners, params.profiles);
+  features.ends = profileEnds(features.corners, features.profiles);
   return features;
+}
+
+std::vector<ProfileEnds> profileEnds(const std::vector<Corner>& corners, const ProfileSet& profiles)
+{
+  constexpr std::size_t MOST = 65536;
+  if (corners.size() > MOST)
+  {
+    throw std::invalid_argument("profileEnds: too many corners");
+  }
+  std::vector<ProfileEnds> ends;
+  ends.reserve(profiles.pairs.size());
+  for (std::size_t i = 0; i < profiles.pairs.size(); ++i)
+  {
+    const ProfileSet::Pair& pair = profiles.pairs[i];
+    const float length = Eigen::Map<const Eigen::VectorXf>(profiles.feature(i), profiles.coefficients).norm();
+    ends.push_back({ directionKey(corners, pair.start, pair.end), directionKey(corners, pair.end, pair.start),
+                     length > 0.0F ? 1.0F / length : 0.0F });
+  }
+  return ends;
 }
 
 AssociationMatrix associatePoints(const PointFeatures& reference, const ProfileIndex& index,
@@ -272,22 +333,18 @@ AssociationMatrix associatePoints(const PointFeatures& reference, const ProfileI
   const SimilarProfiles similar = index.search(current.profiles, params.search);
   const std::vector<float> votes = countVotes(reference, current, similar);
 
-  const std::vector<char> chosen =
-      params.cyclic_order ? strongestEntries(votes, rows, columns, params.cyclic_entries) : std::vector<char>();
+  const std::vector<std::size_t> places =
+      strongestEntries(votes, rows, columns, params.cyclic_order ? params.cyclic_entries : 0);
   std::vector<Association> entries;
-  std::vector<int> entry_of(votes.size(), -1);
-  for (std::size_t k = 0; k < votes.size(); ++k)
+  entries.reserve(places.size());
+  for (const std::size_t place : places)
   {
-    if (params.cyclic_order ? chosen[k] != 0 : votes[k] > 0.0F)
-    {
-      entry_of[k] = static_cast<int>(entries.size());
-      entries.push_back(
-          { static_cast<int>(k / columns), static_cast<int>(k % columns), static_cast<double>(votes[k]) });
-    }
+    entries.push_back(
+        { static_cast<int>(place / columns), static_cast<int>(place % columns), static_cast<double>(votes[place]) });
   }
   if (params.cyclic_order)
   {
-    const GroupedVotes grouped = groupVotes(reference, current, similar, entry_of, entries.size(), params);
+    const GroupedVotes grouped = groupVotes(reference, current, similar, places, params);
     cv::parallel_for_(cv::Range(0, static_cast<int>(entries.size())), [&](const cv::Range& range) {
       EntryAligner aligner;
       for (std::size_t e = static_cast<std::size_t>(range.start); e < static_cast<std::size_t>(range.end); ++e)

@@ -11,7 +11,9 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
+#include <numeric>
 #include <stdexcept>
+#include <type_traits>
 #include <utility>
 #include <variant>
 
@@ -56,9 +58,11 @@ std::vector<char> largest(const ProfileSet& profiles, double share)
 std::vector<Parameter> parameters(ProfileSearchParams& params)
 {
   return {
-    choice<ProfileSearch>("search", params.search,
-                          { { "nearest", ProfileSearch::NEAREST }, { "radius", ProfileSearch::RADIUS } },
-                          "a profile votes for its nearest (K_v) or for all in a radius (D_v)"),
+    choice<ProfileSearch>(
+        "search", params.search,
+        { { "nearest", ProfileSearch::NEAREST }, { "radius", ProfileSearch::RADIUS }, { "leaf", ProfileSearch::LEAF } },
+        "a profile votes for its nearest (K_v), for all in a radius (D_v), or for those that the index keeps where it "
+        "belongs"),
     integer("search_neighbours", params.neighbours, "", "[1, 1000]", "K_v: profiles that each votes for"),
     real("search_radius", params.radius, "standard deviations", "> 0", "D_v: distance of similar profiles"),
     real("search_epsilon", params.epsilon, "", ">= 0", "tolerance of the search for the nearest, 0 = exact"),
@@ -77,28 +81,61 @@ struct ProfileIndex::Tree
   std::vector<ProfileMatch> source;  // of the tree's vectors
   std::variant<KdTree<4>, KdTree<6>, KdTree<8>> tree;
 
-  /** Appends what is similar to a directed profile, nearest first. */
-  void search(const float* query, const ProfileSearchParams& params, std::vector<ProfileMatch>& matches) const
+  /** Searches for some of the current profiles; appends what is similar to each, and how many these are. */
+  void search(const ProfileSet& current, std::size_t begin, std::size_t end, const std::vector<char>& wanted,
+              const ProfileSearchParams& params, std::vector<ProfileMatch>& matches, std::size_t* counts) const
   {
     std::visit(
         [&](const auto& typed_tree) {
           std::vector<typename std::decay_t<decltype(typed_tree)>::Neighbour> found;
-          if (params.search == ProfileSearch::RADIUS)
+          std::vector<float> reversed(columns);
+          for (std::size_t i = begin; i < end; ++i)
           {
-            typed_tree.findWithin(query, static_cast<float>(params.radius), found);
-          }
-          else
-          {
-            typed_tree.findNearest(query, static_cast<std::size_t>(params.neighbours),
-                                   static_cast<float>(params.epsilon), found);
-          }
-          matches.reserve(found.size());
-          for (const auto& neighbour : found)
-          {
-            matches.push_back(source[neighbour.index]);
+            counts[i] = 0;
+            if (wanted[i] == 0)
+            {
+              continue;
+            }
+            const float* query = current.feature(i);
+            const bool turned = query[DIRECTING_FEATURE] < 0.0F;
+            if (turned)
+            {
+              reverse(query, columns, reversed.data());
+              query = reversed.data();
+            }
+            const std::size_t before = matches.size();
+            const auto take = [&](std::uint32_t number) {
+              matches.push_back({ source[number].reference, source[number].reversed != turned });
+            };
+            if (params.search == ProfileSearch::LEAF)
+            {
+              const auto [first, last] = typed_tree.leafOf(query);
+              std::for_each(first, last, take);
+            }
+            else
+            {
+              find(typed_tree, query, params, found);
+              std::for_each(found.begin(), found.end(), [&](const auto& neighbour) { take(neighbour.index); });
+            }
+            counts[i] = matches.size() - before;
           }
         },
         tree);
+  }
+
+  /** What is similar to a directed profile, nearest first. */
+  template <typename TypedTree>
+  static void find(const TypedTree& tree, const float* query, const ProfileSearchParams& params,
+                   std::vector<typename TypedTree::Neighbour>& found)
+  {
+    if (params.search == ProfileSearch::RADIUS)
+    {
+      tree.findWithin(query, static_cast<float>(params.radius), found);
+    }
+    else
+    {
+      tree.findNearest(query, static_cast<std::size_t>(params.neighbours), static_cast<float>(params.epsilon), found);
+    }
   }
 };
 
@@ -141,40 +178,32 @@ ProfileIndex::~ProfileIndex() = default;
 ProfileIndex::ProfileIndex(ProfileIndex&&) noexcept = default;
 ProfileIndex& ProfileIndex::operator=(ProfileIndex&&) noexcept = default;
 
-std::vector<std::vector<ProfileMatch>> ProfileIndex::search(const ProfileSet& current,
-                                                            const ProfileSearchParams& params) const
+SimilarProfiles ProfileIndex::search(const ProfileSet& current, const ProfileSearchParams& params) const
 {
-  const std::size_t columns = tree_->columns;
-  if (static_cast<std::size_t>(current.coefficients) != columns)
+  constexpr std::size_t PARTS = 8;  // that threads share
+  if (static_cast<std::size_t>(current.coefficients) != tree_->columns)
   {
     throw std::invalid_argument("ProfileIndex: the two images' profiles differ in their number of features");
   }
-  std::vector<std::vector<ProfileMatch>> matches(current.pairs.size());
+  const std::size_t count = current.pairs.size();
   const std::vector<char> wanted = largest(current, params.share);
-  cv::parallel_for_(cv::Range(0, static_cast<int>(current.pairs.size())), [&](const cv::Range& range) {
-    std::vector<float> reversed(columns);
-    for (int i = range.start; i < range.end; ++i)
+  std::vector<std::vector<ProfileMatch>> parts(PARTS);
+  std::vector<std::size_t> begin(count + 1, 0);  // first the numbers of similar profiles, each at the next one's place
+  cv::parallel_for_(cv::Range(0, static_cast<int>(PARTS)), [&](const cv::Range& range) {
+    for (std::size_t part = static_cast<std::size_t>(range.start); part < static_cast<std::size_t>(range.end); ++part)
     {
-      if (wanted[static_cast<std::size_t>(i)] == 0)
-      {
-        continue;
-      }
-      const float* query = current.feature(static_cast<std::size_t>(i));
-      const bool turned = query[DIRECTING_FEATURE] < 0.0F;
-      if (turned)
-      {
-        reverse(query, columns, reversed.data());
-        query = reversed.data();
-      }
-      std::vector<ProfileMatch>& found = matches[static_cast<std::size_t>(i)];
-      tree_->search(query, params, found);
-      for (ProfileMatch& match : found)
-      {
-        match.reversed = match.reversed != turned;
-      }
+      tree_->search(current, count * part / PARTS, count * (part + 1) / PARTS, wanted, params, parts[part],
+                    begin.data() + 1);
     }
   });
-  return matches;
+  std::partial_sum(begin.begin(), begin.end(), begin.begin());
+  std::vector<ProfileMatch> matches;
+  matches.reserve(begin.back());
+  for (const std::vector<ProfileMatch>& part : parts)
+  {
+    matches.insert(matches.end(), part.begin(), part.end());
+  }
+  return SimilarProfiles(std::move(matches), std::move(begin));
 }
 
 }  // namespace view_servo

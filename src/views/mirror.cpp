@@ -25,6 +25,7 @@ PointFeatures mirrored(PointFeatures features, int width)
   {
     corner.position.x() = width - 1.0 - corner.position.x();
   }
+  features.ends = profileEnds(features.corners, features.profiles);
   return features;
 }
 
@@ -65,8 +66,9 @@ double significanceOf(const PointFeatures& reference, const ProfileIndex& index,
 }  // namespace
 
 bool isMirrored(const PreparedImage& reference, int reference_level, const PreparedImage& current, int current_level,
-                Rng& rng)
+                double significance, Rng& rng)
 {
+  constexpr double CLEARLY = 0.5;  // times the significance of what was found
   constexpr double SHARE = 0.3;    // of the profiles
   constexpr int ITERATIONS = 300;  // enough where a third of the candidates agrees
   PointViewMatcherParams params;
@@ -76,11 +78,11 @@ bool isMirrored(const PreparedImage& reference, int reference_level, const Prepa
   const PointFeatures& from = reference.points(reference_level);
   const PointFeatures& to = current.points(current_level);
   const cv::Size size = current.image(current_level).size();
-  const auto significance = [&](const PointFeatures& features) {
+  const auto significanceWith = [&](const PointFeatures& features) {
     return significanceOf(from, reference.profileIndex(reference_level), features, size, params, rng);
   };
-  const double turned = significance(mirrored(to, size.width));
-  return turned > params.min_log_significance && turned > significance(to);
+  const double turned = significanceWith(mirrored(to, size.width));
+  return turned > std::max(params.min_log_significance, CLEARLY * significance) && turned > significanceWith(to);
 }
 
 }  // namespace view_servo

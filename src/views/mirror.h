@@ -19,8 +19,10 @@ constexpr const char* MIRRORED =
  * Profiles are the same in a mirrored image and only their cyclic order is reversed, so the corners need not be found
  * anew: they are matched once as they are and once mirrored.
  * @param reference_level, current_level the scales at which the images match.
+ * @param significance -log10 of the false alarms of the points' geometry that was found. It is from more profiles than are compared
+ * here, which may be too few for an oblique view: the mirrored image has to reach half of it.
  */
 bool isMirrored(const PreparedImage& reference, int reference_level, const PreparedImage& current, int current_level,
-                Rng& rng);
+                double significance, Rng& rng);
 
 }  // namespace view_servo

@@ -46,7 +46,7 @@ struct LevelPair
   int reference;
   int current;
 };
-// After the full images: both blurred (2, 2), the current one smaller by 2 (2, 0), larger by 2 (0, 2), and so on.
+// Besides the full images: both blurred (2, 2), the current one smaller by 2 (2, 0), larger by 2 (0, 2), and so on.
 constexpr LevelPair OTHER_SCALES[] = { { 2, 2 }, { 2, 0 }, { 0, 2 }, { 4, 4 }, { 3, 0 }, { 0, 3 }, { 4, 0 }, { 0, 4 } };
 
 /** One comparison of two levels. */
@@ -54,36 +54,18 @@ struct LevelTrial
 {
   LevelPair levels;
   double share;             ///< of the profiles that are searched for
+  ProfileSearch search;     ///< how each is
   double min_significance;  ///< that a geometry must have to end the search
 };
 
-// A geometry from a share of the profiles ends the search only if it is beyond doubt, as most are; in the others the rest
-// of the profiles may find a better one.
+// A geometry from a quick search, or from a share of the profiles, ends the search only if it is beyond doubt, as most are; in
+// the others the rest of the profiles may find a better one.
 constexpr double BEYOND_DOUBT = 10.0;  // times the significance asked for
 
 // A symmetric thing that matches in a mirrored image does so with less than this significance or, where it is large, with
 // much around it that does not match.
 constexpr double BEYOND_MIRRORS = 60.0;
 constexpr double MOST_CANDIDATES = 0.5;
-
-std::vector<LevelTrial> levelTrials(const PointViewMatcherParams& params)
-{
-  const double all = params.points.search.share;
-  std::vector<LevelTrial> result;
-  if (params.first_share < all)
-  {
-    result.push_back({ { 0, 0 }, params.first_share, BEYOND_DOUBT * params.min_log_significance });
-  }
-  result.push_back({ { 0, 0 }, all, params.min_log_significance });
-  if (params.scale_search)
-  {
-    for (const LevelPair& levels : OTHER_SCALES)
-    {
-      result.push_back({ levels, all, params.min_log_significance });
-    }
-  }
-  return result;
-}
 
 /**
  * How much better the best associations of some reference corners are than their second best, summed up over the corners
@@ -106,62 +88,102 @@ double distinctness(const AssociationMatrix& association, std::size_t rows)
   return std::accumulate(best.begin(), most, 0.0);
 }
 
-/** The levels of the sides from which the current image may show the reference, as far as a few profiles tell. */
-std::vector<int> promisingSides(const PreparedImage& reference, const PreparedImage& current, PointMatcherParams params)
-{
-  constexpr double SHARE = 0.2;  // of the profiles
-  constexpr std::size_t MOST = 2;
-  params.search.share *= SHARE;
-  std::vector<std::pair<double, int>> sides;
-  for (int level = PreparedImage::SCALES; level < PreparedImage::LEVELS; ++level)
-  {
-    const PointFeatures& from = reference.points(level);
-    if (from.corners.size() >= MIN_CORNERS && current.points(0).corners.size() >= MIN_CORNERS)
-    {
-      const AssociationMatrix association =
-          associatePoints(from, reference.profileIndex(level), current.points(0), params);
-      sides.emplace_back(distinctness(association, from.corners.size()), level);
-    }
-  }
-  std::sort(sides.rbegin(), sides.rend());
-  std::vector<int> levels;
-  for (std::size_t i = 0; i < std::min(MOST, sides.size()); ++i)
-  {
-    levels.push_back(sides[i].second);
-  }
-  return levels;
-}
-
-/** What to compare, one after the other. Which sides to try is only found out when nothing else has helped. */
+/**
+ * What to compare, one after the other: first the full images, quickly and then thoroughly. Where that finds nothing, the other
+ * scales and sides get a quick look each, and those that promise most are compared thoroughly.
+ */
 class TrialQueue
 {
 public:
-  TrialQueue(const PreparedImage& reference, const PreparedImage& current, const PointViewMatcherParams& params)
-    : reference_(reference), current_(current), params_(params), trials_(levelTrials(params))
+  /** @param given_up see PointViewMatcher::match(). All have to outlive this. */
+  TrialQueue(const PreparedImage& reference, const PreparedImage& current, const PointViewMatcherParams& params,
+             const std::function<bool()>& given_up)
+    : reference_(reference), current_(current), params_(params), given_up_(given_up)
   {
+    if (params.first_share < params.points.search.share)
+    {
+      trials_.push_back({ { 0, 0 }, params.first_share, quickSearch(), BEYOND_DOUBT * params.min_log_significance });
+    }
+    trials_.push_back(thorough({ 0, 0 }));
   }
 
   /** The next one; empty when there is none. */
   std::optional<LevelTrial> next()
   {
-    if (given_ == trials_.size() && params_.side_search && !sides_chosen_)
+    if (given_ == trials_.size() && !looked_)
     {
-      sides_chosen_ = true;
-      for (const int side : promisingSides(reference_, current_, params_.points))
+      looked_ = true;
+      for (const LevelPair& levels : promisingLevels())
       {
-        trials_.push_back({ { side, 0 }, params_.points.search.share, params_.min_log_significance });
+        trials_.push_back(thorough(levels));
       }
     }
     return given_ < trials_.size() ? std::optional<LevelTrial>(trials_[given_++]) : std::nullopt;
   }
 
 private:
+  ProfileSearch quickSearch() const
+  {
+    const ProfileSearch search = params_.points.search.search;
+    return search == ProfileSearch::NEAREST ? ProfileSearch::LEAF : search;
+  }
+
+  LevelTrial thorough(const LevelPair& levels) const
+  {
+    const ProfileSearchParams& search = params_.points.search;
+    return { levels, search.share, search.search, params_.min_log_significance };
+  }
+
+  std::vector<LevelPair> levelsToLookAt() const
+  {
+    std::vector<LevelPair> levels;
+    if (params_.scale_search)
+    {
+      levels.insert(levels.end(), std::begin(OTHER_SCALES), std::end(OTHER_SCALES));
+    }
+    for (int side = PreparedImage::SCALES; params_.side_search && side < PreparedImage::LEVELS; ++side)
+    {
+      levels.push_back({ side, 0 });
+    }
+    return levels;
+  }
+
+  /** Those whose associations stand out most: of 33 planes that only other scales or sides show, the first one did 29. */
+  std::vector<LevelPair> promisingLevels() const
+  {
+    constexpr std::size_t MOST = 2;
+    PointMatcherParams look = params_.points;
+    look.search.share = std::min(params_.first_share, look.search.share);
+    look.search.search = quickSearch();
+    const std::vector<LevelPair> levels = levelsToLookAt();
+    std::vector<std::pair<double, std::size_t>> promises;
+    for (std::size_t i = 0; i < levels.size() && !(given_up_ && given_up_()); ++i)
+    {
+      const PointFeatures& from = reference_.points(levels[i].reference);
+      const PointFeatures& to = current_.points(levels[i].current);
+      if (from.corners.size() >= MIN_CORNERS && to.corners.size() >= MIN_CORNERS)
+      {
+        const AssociationMatrix association =
+            associatePoints(from, reference_.profileIndex(levels[i].reference), to, look);
+        promises.emplace_back(-distinctness(association, from.corners.size()), i);
+      }
+    }
+    std::sort(promises.begin(), promises.end());
+    std::vector<LevelPair> chosen;
+    for (std::size_t i = 0; i < std::min(MOST, promises.size()); ++i)
+    {
+      chosen.push_back(levels[promises[i].second]);
+    }
+    return chosen;
+  }
+
   const PreparedImage& reference_;
   const PreparedImage& current_;
   const PointViewMatcherParams& params_;
+  const std::function<bool()>& given_up_;
   std::vector<LevelTrial> trials_;
   std::size_t given_ = 0;
-  bool sides_chosen_ = false;
+  bool looked_ = false;
 };
 
 Points positions(const std::vector<Corner>& corners)
@@ -209,6 +231,7 @@ public:
               candidates_ }
   {
     params_.points.search.share = trial.share;
+    params_.points.search.search = trial.search;
   }
 
   bool hasFeatures() const
@@ -238,7 +261,8 @@ public:
     const bool maybe_mirrored = result.log_significance < BEYOND_MIRRORS || agreeingPart() < MOST_CANDIDATES;
     if (refusal_ == Refusal::NONE && params_.refuse_mirrored && maybe_mirrored)
     {
-      const bool mirrored = isMirrored(reference_, levels_.reference, current_, levels_.current, rng);
+      const bool mirrored =
+          isMirrored(reference_, levels_.reference, current_, levels_.current, result.log_significance, rng);
       refusal_ = mirrored ? Refusal::MIRRORED : Refusal::NONE;
       clock.finish("mirror");
     }
@@ -608,7 +632,7 @@ ViewMatch PointViewMatcher::match(const PreparedImage& reference, const Prepared
   bool any_features = false;
   bool ended_early = false;
   Refusal refusal = Refusal::NONE;
-  TrialQueue trials(reference, current, params_);
+  TrialQueue trials(reference, current, params_, given_up);
   while (!(ended_early = given_up && given_up()))
   {
     const std::optional<LevelTrial> trial = trials.next();
@@ -633,8 +657,8 @@ ViewMatch PointViewMatcher::match(const PreparedImage& reference, const Prepared
       attempt.report(accepted, result);
     }
     refusal = attempt.refusal();
-    const bool may_change = refusal == Refusal::LEFT_OPEN && trial->share != params_.points.search.share;
-    if (accepted || (refusal != Refusal::NONE && !may_change))
+    const bool quick = trial->min_significance > params_.min_log_significance;
+    if (accepted || (refusal != Refusal::NONE && !(quick && refusal == Refusal::LEFT_OPEN)))
     {
       break;  // what repeats itself at this scale, or lies on one plane, does at others
     }

@@ -607,7 +607,7 @@ ViewMatch SceneMatcher::match(const PreparedImage& reference, const PreparedImag
   const bool repeated = (found || plane) && params_.points.unique && attempt.isRepeated();
   clock.finish("unique");
   const bool mirrored =
-      (found || plane) && !repeated && params_.points.refuse_mirrored && isMirrored(reference, 0, current, 0, rng);
+      (found || plane) && !repeated && params_.points.refuse_mirrored && isMirrored(reference, 0, current, 0, 0.0, rng);
   clock.finish("mirror");
   const bool refused = repeated || mirrored;
   if (found && !refused)

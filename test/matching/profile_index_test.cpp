@@ -142,6 +142,29 @@ TEST(ProfileIndex, FindsOnlyWhatLiesWithinTheRadius)
   EXPECT_EQ(total, expected);  // the radius is not above the margin within which both directions are kept
 }
 
+TEST(ProfileIndex, FindsInALeafWhatIsMuchNearerThanOthers)
+{
+  const ProfileSet reference = randomProfiles(2000, 8, 11);
+  ProfileSet current = reference;
+  cv::RNG rng(12);
+  for (float& value : current.features)
+  {
+    value += static_cast<float>(rng.gaussian(0.02));
+  }
+  ProfileSearchParams params;
+  params.search = ProfileSearch::LEAF;
+  const auto found = ProfileIndex(reference).search(current, params);
+  int again = 0;
+  for (std::size_t c = 0; c < found.size(); ++c)
+  {
+    EXPECT_LE(found[c].size(), 12U);
+    again += std::any_of(found[c].begin(), found[c].end(), [&](const ProfileMatch& match) {
+      return match.reference == static_cast<int>(c) && !match.reversed;
+    });
+  }
+  EXPECT_GT(again, 1800);
+}
+
 TEST(ProfileIndex, SearchesForTheShareWithTheLargestFeatures)
 {
   const ProfileSet reference = randomProfiles(300, 8, 9);
@@ -196,10 +219,11 @@ TEST(ProfileIndex, OfFewOrNoProfilesFindsWhatThereIs)
   const ProfileSet three = randomProfiles(3, 8, 8);
   EXPECT_TRUE(ProfileIndex(none).search(three, ProfileSearchParams())[0].empty());
   EXPECT_TRUE(ProfileIndex(three).search(none, ProfileSearchParams()).empty());
-  for (const auto& found : ProfileIndex(three).search(three, ProfileSearchParams()))
+  const auto found = ProfileIndex(three).search(three, ProfileSearchParams());
+  for (std::size_t i = 0; i < found.size(); ++i)
   {
-    EXPECT_GE(found.size(), 3U);
-    EXPECT_LE(found.size(), 6U);
+    EXPECT_GE(found[i].size(), 3U);
+    EXPECT_LE(found[i].size(), 6U);
   }
 }
 

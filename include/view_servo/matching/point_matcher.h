@@ -11,6 +11,7 @@
 
 #include <opencv2/core/mat.hpp>
 
+#include <cstdint>
 #include <string>
 #include <vector>
 
@@ -41,12 +42,42 @@ struct PointMatcherParams
 /** Names, units and ranges of these parameters, by which validate() checks them. */
 std::vector<Parameter> parameters(PointMatcherParams& params);
 
+/** A profile as seen from its ends. */
+struct ProfileEnds
+{
+  /**
+   * Orders it among the profiles that start where it starts. The upper half is the angle (as the monotonic and cheaper diamond
+   * angle, in 2^14 steps a quadrant), the lower half the corner at the other end: so that all at a corner differ.
+   */
+  std::uint32_t from_start;
+  std::uint32_t from_end;  ///< the same where it ends
+  float inverse_length;    ///< 1 / length of the vector of its features; 0 where that is 0
+
+  /** Index of the corner where it starts. */
+  std::uint32_t start() const
+  {
+    return from_end & 0xFFFFU;
+  }
+  /** Index of the corner where it ends. */
+  std::uint32_t end() const
+  {
+    return from_start & 0xFFFFU;
+  }
+};
+
 /** What matching needs of one image. */
 struct PointFeatures
 {
   std::vector<Corner> corners;
   ProfileSet profiles;
+  std::vector<ProfileEnds> ends;  ///< of each profile
 };
+
+/**
+ * The ends of all profiles between corners.
+ * @throws std::invalid_argument when there are more than 65536 corners.
+ */
+std::vector<ProfileEnds> profileEnds(const std::vector<Corner>& corners, const ProfileSet& profiles);
 
 /** Corners and profiles of an 8-bit, one-channel image; mask as in detectCorners(). */
 PointFeatures extractPointFeatures(const cv::Mat& image, const PointMatcherParams& params,

@@ -5,8 +5,10 @@
 #include "view_servo/features/profiles.h"
 #include "view_servo/parameters/parameter.h"
 
+#include <cstddef>
 #include <memory>
 #include <string>
+#include <utility>
 #include <vector>
 
 namespace view_servo
@@ -15,7 +17,8 @@ namespace view_servo
 enum class ProfileSearch
 {
   NEAREST,  ///< its K_v nearest
-  RADIUS    ///< all within D_v
+  RADIUS,   ///< all within D_v
+  LEAF  ///< those of the tree's leaf where it belongs, twelve at most: many are among its nearest, and none is sought
 };
 
 struct ProfileSearchParams
@@ -23,7 +26,7 @@ struct ProfileSearchParams
   ProfileSearch search = ProfileSearch::NEAREST;
   int neighbours = 12;   ///< K_v (NEAREST): number of profiles each votes for; 25 find 2 % more, in 1.6 times the time
   double radius = 0.5;   ///< D_v (RADIUS): distance of similar profiles [standard deviations of a feature]
-  double epsilon = 3.0;  ///< a neighbour found is at most (1 + epsilon) times farther than the true one (NEAREST)
+  double epsilon = 2.0;  ///< a neighbour found is at most (1 + epsilon) times farther than the true one (NEAREST)
   double share = 1.0;    ///< part of the current profiles that vote: those whose feature vectors are longest
 
   /** All faults, one a line; empty when the parameters are usable. */
@@ -40,6 +43,62 @@ struct ProfileMatch
   bool reversed;  ///< the reference profile, read from end to start, is similar to the current one from start to end
 };
 
+/** The reference profiles similar to each current one; nearest first, but for ProfileSearch::LEAF. */
+class SimilarProfiles
+{
+public:
+  struct Range
+  {
+    const ProfileMatch* first;
+    const ProfileMatch* last;
+
+    const ProfileMatch* begin() const
+    {
+      return first;
+    }
+    const ProfileMatch* end() const
+    {
+      return last;
+    }
+    std::size_t size() const
+    {
+      return static_cast<std::size_t>(last - first);
+    }
+    bool empty() const
+    {
+      return first == last;
+    }
+    const ProfileMatch& operator[](std::size_t i) const
+    {
+      return first[i];
+    }
+  };
+
+  /** @param begin those of profile i are matches[begin[i]] .. matches[begin[i + 1] - 1]; one more number than profiles. */
+  SimilarProfiles(std::vector<ProfileMatch> matches, std::vector<std::size_t> begin)
+    : matches_(std::move(matches)), begin_(std::move(begin))
+  {
+  }
+
+  /** How many current profiles there are, those without similar ones included. */
+  std::size_t size() const
+  {
+    return begin_.size() - 1;
+  }
+  bool empty() const
+  {
+    return size() == 0;
+  }
+  Range operator[](std::size_t profile) const
+  {
+    return { matches_.data() + begin_[profile], matches_.data() + begin_[profile + 1] };
+  }
+
+private:
+  std::vector<ProfileMatch> matches_;
+  std::vector<std::size_t> begin_;
+};
+
 /** Kd-tree over the profiles of a reference image, in both directions. */
 class ProfileIndex
 {
@@ -51,11 +110,11 @@ public:
   ProfileIndex& operator=(ProfileIndex&&) noexcept;
 
   /**
-   * For each profile of `current` the similar ones of the reference, nearest first; none for those that are not
-   * searched for. On all of OpenCV's threads.
+   * For each profile of `current` the similar ones of the reference; none for those that are not searched for. On all of
+   * OpenCV's threads.
    * @throws std::invalid_argument when the two sets differ in their number of coefficients.
    */
-  std::vector<std::vector<ProfileMatch>> search(const ProfileSet& current, const ProfileSearchParams& params) const;
+  SimilarProfiles search(const ProfileSet& current, const ProfileSearchParams& params) const;
 
 private:
   struct Tree;
