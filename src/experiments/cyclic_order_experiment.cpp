@@ -110,6 +110,8 @@ std::vector<OrderSetting> orderSettings(const ExperimentContext& context)
   ours.params.seed = context.seedOf(DRAWN_PICTURES, ours.params.seed);
   ours.params.guided = false;
   ours.params.scale_search = false;
+  ours.params.side_search = false;
+  ours.params.unique = false;  // pictures that repeat themselves are no other question for one order than for the other
   ours.params.first_share = 1.0;  // so that both orders look at the same profiles
   OrderSetting thesis = ours;
   thesis.name = "thesis";
