@@ -636,6 +636,7 @@ ViewMatch PointViewMatcher::match(const PreparedImage& reference, const Prepared
   while (!(ended_early = given_up && given_up()))
   {
     const std::optional<LevelTrial> trial = trials.next();
+    clock.finish("looks");
     if (!trial)
     {
       break;
