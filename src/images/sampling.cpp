@@ -15,7 +15,7 @@ void BilinearSampler::alongLine(const Eigen::Vector2f& first, const Eigen::Vecto
   const cv::v_float32x4 step_u = cv::v_setall_f32(step.x());
   const cv::v_float32x4 step_v = cv::v_setall_f32(step.y());
   const cv::v_uint32x4 byte = cv::v_setall_u32(0xFFU);
-  const auto toFloat = [](const cv::v_uint32x4& number) {
+  const auto to_float = [](const cv::v_uint32x4& number) {
     return cv::v_cvt_f32(cv::v_reinterpret_as_s32(number));
   };
   cv::v_float32x4 numbers(0.0F, 1.0F, 2.0F, 3.0F);
@@ -38,10 +38,10 @@ void BilinearSampler::alongLine(const Eigen::Vector2f& first, const Eigen::Vecto
       packed[k] = static_cast<std::uint32_t>(p[0] | p[1] << 8) | static_cast<std::uint32_t>(q[0] | q[1] << 8) << 16U;
     }
     const cv::v_uint32x4 pixels = cv::v_load(packed);
-    const cv::v_float32x4 top_left = toFloat(pixels & byte);
-    const cv::v_float32x4 top_right = toFloat((pixels >> 8) & byte);
-    const cv::v_float32x4 bottom_left = toFloat((pixels >> 16) & byte);
-    const cv::v_float32x4 bottom_right = toFloat(pixels >> 24);
+    const cv::v_float32x4 top_left = to_float(pixels & byte);
+    const cv::v_float32x4 top_right = to_float((pixels >> 8) & byte);
+    const cv::v_float32x4 bottom_left = to_float((pixels >> 16) & byte);
+    const cv::v_float32x4 bottom_right = to_float(pixels >> 24);
     const cv::v_float32x4 fu = u - cv::v_cvt_f32(left);
     const cv::v_float32x4 fv = v - cv::v_cvt_f32(top);
     const cv::v_float32x4 above = top_left + fu * (top_right - top_left);
