@@ -107,7 +107,7 @@ std::vector<Peak> localMaxima(const cv::Mat& response, const cv::Mat& mask, int 
 {
   constexpr int LANES = 4;
   std::vector<Peak> peaks;
-  const auto isMaximum = [](const float* above, const float* here, const float* below) {
+  const auto is_maximum = [](const float* above, const float* here, const float* below) {
     const float r = here[0];
     // Strict against the neighbours that come later and not strict before: a plateau of two gives one peak.
     return r > 0.0F && r >= here[-1] && r > here[1] && r >= above[-1] && r >= above[0] && r >= above[1] &&
@@ -129,7 +129,7 @@ std::vector<Peak> localMaxima(const cv::Mat& response, const cv::Mat& mask, int 
       }
       for (int k = u; k < std::min(u + LANES, end); ++k)
       {
-        if (isMaximum(above + k, here + k, below + k) && (wanted == nullptr || wanted[k] != 0))
+        if (is_maximum(above + k, here + k, below + k) && (wanted == nullptr || wanted[k] != 0))
         {
           peaks.push_back({ k, v, here[k] });
         }
@@ -205,10 +205,10 @@ std::vector<Corner> detectCorners(const cv::Mat& image, const CornerParams& para
   const cv::Mat response = harrisResponse(image, params);
   std::vector<Peak> peaks = localMaxima(response, mask, params.border);
   // Most are never looked at: a heap gives one after the other.
-  const auto isWeaker = [](const Peak& a, const Peak& b) {
+  const auto is_weaker = [](const Peak& a, const Peak& b) {
     return isStronger(b, a);
   };
-  std::make_heap(peaks.begin(), peaks.end(), isWeaker);
+  std::make_heap(peaks.begin(), peaks.end(), is_weaker);
   const double weakest = peaks.empty() ? 0.0 : params.relative_threshold * static_cast<double>(peaks.front().response);
 
   // Strongest first, each taken unless one already taken is too close; a grid keeps the search local.
@@ -222,7 +222,7 @@ std::vector<Corner> detectCorners(const cv::Mat& image, const CornerParams& para
   const double min_squared = params.min_distance * params.min_distance;
   for (; !peaks.empty() && static_cast<int>(corners.size()) < params.max_corners; peaks.pop_back())
   {
-    std::pop_heap(peaks.begin(), peaks.end(), isWeaker);
+    std::pop_heap(peaks.begin(), peaks.end(), is_weaker);
     const Peak& peak = peaks.back();
     if (static_cast<double>(peak.response) < weakest)
     {

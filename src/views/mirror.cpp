@@ -78,11 +78,11 @@ bool isMirrored(const PreparedImage& reference, int reference_level, const Prepa
   const PointFeatures& from = reference.points(reference_level);
   const PointFeatures& to = current.points(current_level);
   const cv::Size size = current.image(current_level).size();
-  const auto significanceWith = [&](const PointFeatures& features) {
+  const auto significance_with = [&](const PointFeatures& features) {
     return significanceOf(from, reference.profileIndex(reference_level), features, size, params, rng);
   };
-  const double turned = significanceWith(mirrored(to, size.width));
-  return turned > std::max(params.min_log_significance, CLEARLY * significance) && turned > significanceWith(to);
+  const double turned = significance_with(mirrored(to, size.width));
+  return turned > std::max(params.min_log_significance, CLEARLY * significance) && turned > significance_with(to);
 }
 
 }  // namespace view_servo
