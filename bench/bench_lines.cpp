@@ -11,9 +11,11 @@
  * - roll: the same, with the current image turned by 30, 90 and 180 degrees, segments with it.
  * - merton: three views of a building from the images alone; what F from line intersections makes of the corners that
  *   are labelled there, none of which took part.
- * - time: medians of everything from two images to matches, and of one live image against a stored one, for images of
- *   640x480 with about 300 segments, as ratios to LSD with LBD.
+ * - time: processor time of everything from two images to matches, and of one live image against a stored one, for
+ *   images of 640x480 with at most 300 segments, beside LSD with LBD and EDLines with LBD.
  */
+#include "timing.h"
+
 #include "experiments/line_ground_truth.h"
 #include "view_servo/geometry/fundamental.h"
 #include "view_servo/images/image_io.h"
@@ -22,11 +24,11 @@
 
 #include <Eigen/Geometry>
 #include <opencv2/core.hpp>
+#include <opencv2/features2d.hpp>
 #include <opencv2/imgproc.hpp>
 #include <opencv2/line_descriptor.hpp>
 
 #include <algorithm>
-#include <chrono>
 #include <cmath>
 #include <cstdio>
 #include <cstdlib>
@@ -34,6 +36,7 @@
 #include <functional>
 #include <iostream>
 #include <iterator>
+#include <memory>
 #include <sstream>
 #include <stdexcept>
 #include <string>
@@ -45,17 +48,6 @@ namespace
 using namespace view_servo;  // NOLINT(google-build-using-namespace): a program of its own
 
 using IndexPairs = std::vector<std::pair<int, int>>;
-
-double millisecondsSince(std::chrono::steady_clock::time_point start)
-{
-  return std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - start).count();
-}
-
-double median(std::vector<double> values)
-{
-  std::nth_element(values.begin(), values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2), values.end());
-  return values[values.size() / 2];
-}
 
 cv::line_descriptor::KeyLine toKeyLine(const Segment& segment, int id, const cv::Size& size)
 {
@@ -77,63 +69,47 @@ cv::line_descriptor::KeyLine toKeyLine(const Segment& segment, int id, const cv:
   return line;
 }
 
-/** LBD's matches of the segments of at least `min_length`. */
-IndexPairs matchByLbd(const cv::Mat& reference, const Segments& reference_segments, const cv::Mat& current,
-                      const Segments& current_segments, double min_length)
+/** Segments of an image with LBD's descriptors. */
+struct LbdLines
 {
-  const auto describe = [&](const cv::Mat& image, const Segments& segments, cv::Mat& descriptors) {
-    std::vector<cv::line_descriptor::KeyLine> lines;
-    std::vector<int> ids;
-    for (std::size_t i = 0; i < segments.size(); ++i)
+  std::vector<int> indices;  ///< of the segment of each row
+  cv::Mat descriptors;
+};
+
+/** Those of at least `min_length` [px]. */
+LbdLines describeByLbd(const cv::Mat& image, const Segments& segments, double min_length)
+{
+  LbdLines described;
+  std::vector<cv::line_descriptor::KeyLine> lines;
+  for (std::size_t i = 0; i < segments.size(); ++i)
+  {
+    if (segments[i].length() >= min_length)
     {
-      if (segments[i].length() >= min_length)
-      {
-        lines.push_back(toKeyLine(segments[i], static_cast<int>(lines.size()), image.size()));
-        ids.push_back(static_cast<int>(i));
-      }
+      lines.push_back(toKeyLine(segments[i], static_cast<int>(lines.size()), image.size()));
+      described.indices.push_back(static_cast<int>(i));
     }
-    if (!lines.empty())
-    {
-      cv::line_descriptor::BinaryDescriptor::createBinaryDescriptor()->compute(image, lines, descriptors);
-    }
-    return ids;
-  };
-  cv::Mat from;
-  cv::Mat to;
-  const std::vector<int> from_ids = describe(reference, reference_segments, from);
-  const std::vector<int> to_ids = describe(current, current_segments, to);
+  }
+  if (!lines.empty())
+  {
+    cv::line_descriptor::BinaryDescriptor::createBinaryDescriptor()->compute(image, lines, described.descriptors);
+  }
+  return described;
+}
+
+/** Those that are each other's nearest. */
+IndexPairs matchByLbd(const LbdLines& reference, const LbdLines& current)
+{
   IndexPairs matches;
-  if (from.empty() || to.empty())
+  if (reference.descriptors.empty() || current.descriptors.empty())
   {
     return matches;
   }
-  // Cross-checked by hand: each the other's nearest.
-  const auto nearest = [](const cv::Mat& of, const cv::Mat& among) {
-    std::vector<int> best(static_cast<std::size_t>(of.rows));
-    for (int i = 0; i < of.rows; ++i)
-    {
-      double least = 1e9;
-      for (int k = 0; k < among.rows; ++k)
-      {
-        const double distance = cv::norm(of.row(i), among.row(k), cv::NORM_HAMMING);
-        if (distance < least)
-        {
-          least = distance;
-          best[static_cast<std::size_t>(i)] = k;
-        }
-      }
-    }
-    return best;
-  };
-  const std::vector<int> forward = nearest(from, to);
-  const std::vector<int> backward = nearest(to, from);
-  for (std::size_t i = 0; i < forward.size(); ++i)
+  std::vector<cv::DMatch> mutual;
+  cv::BFMatcher(cv::NORM_HAMMING, true).match(reference.descriptors, current.descriptors, mutual);
+  for (const cv::DMatch& match : mutual)
   {
-    const std::size_t k = static_cast<std::size_t>(forward[i]);
-    if (backward[k] == static_cast<int>(i))
-    {
-      matches.emplace_back(from_ids[i], to_ids[k]);
-    }
+    matches.emplace_back(reference.indices[static_cast<std::size_t>(match.queryIdx)],
+                         current.indices[static_cast<std::size_t>(match.trainIdx)]);
   }
   return matches;
 }
@@ -171,8 +147,8 @@ int runBenchmark(const std::filesystem::path& data, const LineViewMatcher& match
   int sum_ours = 0;
   for (const LinePair& pair : readBenchmarkPairs(data))
   {
-    const IndexPairs lbd =
-        matchByLbd(pair.reference, pair.reference_segments, pair.current, pair.current_segments, LBD_MIN_LENGTH);
+    const IndexPairs lbd = matchByLbd(describeByLbd(pair.reference, pair.reference_segments, LBD_MIN_LENGTH),
+                                      describeByLbd(pair.current, pair.current_segments, LBD_MIN_LENGTH));
     const IndexPairs ours = matchByStructure(pair, matcher);
     const int lbd_correct = correct(lbd, pair);
     const int ours_correct = correct(ours, pair);
@@ -298,60 +274,133 @@ int runMerton(const std::filesystem::path& data, const LineViewMatcher& matcher)
   return 0;
 }
 
+/** One way from two images to matches of lines. */
+struct Timing
+{
+  std::string name;
+  std::function<void(const LinePair&)> prepare;  ///< what is done once for a stored reference
+  std::function<void(const LinePair&)> match;    ///< of a stored reference with a live image
+  std::vector<double> fresh{};                   ///< processor time of both, for each run [ms]
+  std::vector<double> stored{};                  ///< of `match` alone [ms]
+};
+
+/** Segments by `detect`, LBD's descriptors and cross-checked matches. */
+Timing timingOfLbd(const std::string& name, const std::function<Segments(const cv::Mat&)>& detect)
+{
+  const auto descriptors = std::make_shared<LbdLines>();
+  return { name,
+           [=](const LinePair& pair) { *descriptors = describeByLbd(pair.reference, detect(pair.reference), 0.0); },
+           [=](const LinePair& pair) {
+             matchByLbd(*descriptors, describeByLbd(pair.current, detect(pair.current), 0.0));
+           } };
+}
+
+/** The segments that come with LBD: EDLines of the image itself, without its pyramid. */
+Segments detectByEdLines(const cv::Mat& image)
+{
+  std::vector<cv::line_descriptor::KeyLine> lines;
+  const auto params = [] {
+    cv::line_descriptor::BinaryDescriptor::Params one_octave;
+    one_octave.numOfOctave_ = 1;
+    return one_octave;
+  }();
+  cv::line_descriptor::BinaryDescriptor::createBinaryDescriptor(params)->detect(image, lines);
+  Segments segments;
+  for (const cv::line_descriptor::KeyLine& line : lines)
+  {
+    segments.push_back({ { line.startPointX, line.startPointY }, { line.endPointX, line.endPointY } });
+  }
+  return segments;
+}
+
 int runTime(const std::filesystem::path& data, LineMatcherParams params, int runs)
 {
-  cv::setNumThreads(2);
-  params.segments.max_segments = 300;
+  static constexpr std::size_t MAX_SEGMENTS = 300;
+  params.segments.max_segments = MAX_SEGMENTS;
   const LineViewMatcher matcher(params);
   const auto longest = [](Segments segments) {
     std::stable_sort(segments.begin(), segments.end(),
                      [](const Segment& a, const Segment& b) { return a.length() > b.length(); });
-    segments.resize(std::min<std::size_t>(segments.size(), 300));
+    segments.resize(std::min(segments.size(), MAX_SEGMENTS));
     return segments;
   };
-  std::printf("%-20s %9s %10s %10s %10s %7s %7s\n", "640x480, 2 threads", "segments", "LSD+LBD ms", "ours ms",
-              "stored ms", "ratio", "stored");
-  for (LinePair pair : readBenchmarkPairs(data))
+  LineSegmentParams lsd;
+  lsd.detector = SegmentDetector::LSD;
+  lsd.max_segments = MAX_SEGMENTS;
+  const auto prepared = [&params](const cv::Mat& image) {
+    auto features = std::make_shared<LineFeatures>(image, detectLineSegments(image, params.segments), params.features);
+    features->index(LineGrouping::TRIPLETS);
+    return features;
+  };
+  std::shared_ptr<LineFeatures> reference;
+  for (const int threads : { 1, 2 })
   {
-    const cv::Size size(640, 480);
-    cv::resize(pair.reference, pair.reference, size, 0.0, 0.0, cv::INTER_AREA);
-    cv::resize(pair.current, pair.current, size, 0.0, 0.0, cv::INTER_AREA);
-    LineSegmentParams lsd;
-    lsd.detector = SegmentDetector::LSD;
-    lsd.max_segments = 300;
-    std::vector<double> theirs;
-    std::vector<double> ours;
-    std::vector<double> stored;
-    std::size_t count = 0;
-    for (int run = 0; run < runs; ++run)
+    cv::setNumThreads(threads);
+    std::printf("640x480, threads: %d, processor time, medians of %d runs in ms\n%-20s %8s", threads, runs, "",
+                "segments");
+    std::vector<double> sums;
+    bool first = true;
+    for (LinePair pair : readBenchmarkPairs(data))
     {
-      auto start = std::chrono::steady_clock::now();
-      const Segments a = longest(detectLineSegments(pair.reference, lsd));
-      const Segments b = longest(detectLineSegments(pair.current, lsd));
-      matchByLbd(pair.reference, a, pair.current, b, 0.0);
-      theirs.push_back(millisecondsSince(start));
-
-      start = std::chrono::steady_clock::now();
-      Segments segments[2];
-      cv::parallel_for_(cv::Range(0, 2), [&](const cv::Range& range) {
-        for (int i = range.start; i < range.end; ++i)
+      const cv::Size size(640, 480);
+      cv::resize(pair.reference, pair.reference, size, 0.0, 0.0, cv::INTER_AREA);
+      cv::resize(pair.current, pair.current, size, 0.0, 0.0, cv::INTER_AREA);
+      std::vector<Timing> timings = {
+        { "view_servo", [&](const LinePair& of) { reference = prepared(of.reference); },
+          [&](const LinePair& of) {
+            matcher.match(*reference, *prepared(of.current), GeometryModel::HOMOGRAPHY, LineGrouping::TRIPLETS);
+          } },
+        timingOfLbd("LSD+LBD", [&](const cv::Mat& image) { return longest(detectLineSegments(image, lsd)); }),
+        timingOfLbd("EDLines+LBD", [&](const cv::Mat& image) { return longest(detectByEdLines(image)); }),
+      };
+      if (first)
+      {
+        for (const Timing& timing : timings)
         {
-          segments[i] = detectLineSegments(i == 0 ? pair.reference : pair.current, params.segments);
+          std::printf(" %12s %8s", timing.name.c_str(), "stored");
         }
-      });
-      const LineFeatures reference(pair.reference, segments[0], params.features);
-      const LineFeatures current(pair.current, segments[1], params.features);
-      matcher.match(reference, current, GeometryModel::HOMOGRAPHY, LineGrouping::TRIPLETS);
-      ours.push_back(millisecondsSince(start));
-      count = reference.segments().size();
-
-      start = std::chrono::steady_clock::now();
-      const LineFeatures live(pair.current, detectLineSegments(pair.current, params.segments), params.features);
-      matcher.match(reference, live, GeometryModel::HOMOGRAPHY, LineGrouping::TRIPLETS);
-      stored.push_back(millisecondsSince(start));
+        std::printf("\n");
+        sums.assign(2 * timings.size(), 0.0);
+        first = false;
+      }
+      for (int run = 0; run < runs + 1; ++run)  // the first warms up
+      {
+        for (Timing& timing : timings)
+        {
+          const double start = processorTime();
+          timing.prepare(pair);
+          const double stored = processorTime();
+          timing.match(pair);
+          const double end = processorTime();
+          if (run > 0)
+          {
+            timing.fresh.push_back(end - start);
+            timing.stored.push_back(end - stored);
+          }
+        }
+      }
+      std::printf("%-20s %8zu", pair.name.c_str(), reference->segments().size());
+      for (std::size_t i = 0; i < timings.size(); ++i)
+      {
+        const double fresh = median(timings[i].fresh);
+        const double stored = median(timings[i].stored);
+        sums[2 * i] += fresh;
+        sums[2 * i + 1] += stored;
+        std::printf(" %12.1f %8.1f", fresh, stored);
+      }
+      std::printf("\n");
     }
-    std::printf("%-20s %9zu %10.0f %10.0f %10.0f %7.2f %7.2f\n", pair.name.c_str(), count, median(theirs), median(ours),
-                median(stored), median(ours) / median(theirs), median(stored) / median(theirs));
+    std::printf("%-20s %8s", "together", "");
+    for (std::size_t i = 0; i < sums.size(); ++i)
+    {
+      std::printf(i % 2 == 0 ? " %12.1f" : " %8.1f", sums[i]);
+    }
+    std::printf("\n%-20s %8s", "of LSD+LBD", "");
+    for (std::size_t i = 0; i < sums.size(); ++i)
+    {
+      std::printf(i % 2 == 0 ? " %12.2f" : " %8.2f", sums[i] / sums[2 + i % 2]);
+    }
+    std::printf("\n");
   }
   return 0;
 }

@@ -13,6 +13,8 @@
  * - time: medians of a match against a stored reference, of one of two fresh images, and of one where there is nothing to be
  *   found, in processor time, beside ORB, AKAZE and SIFT.
  */
+#include "timing.h"
+
 #include "experiments/peer_matches.h"
 #include "view_servo/parameters/parameter.h"
 #include "view_servo/views/point_view_matcher.h"
@@ -33,7 +35,6 @@
 #include <cmath>
 #include <cstdio>
 #include <cstdlib>
-#include <ctime>
 #include <filesystem>
 #include <fstream>
 #include <functional>
@@ -431,20 +432,6 @@ int tilt(const PointViewMatcherParams& params)
     std::printf("\n");
   }
   return 0;
-}
-
-double median(std::vector<double> values)
-{
-  std::nth_element(values.begin(), values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2), values.end());
-  return values[values.size() / 2];
-}
-
-/** Processor time of this process, of all its threads [ms]. */
-double processorTime()
-{
-  timespec time{};
-  clock_gettime(CLOCK_PROCESS_CPUTIME_ID, &time);
-  return 1e3 * static_cast<double>(time.tv_sec) + 1e-6 * static_cast<double>(time.tv_nsec);
 }
 
 /** What a matcher takes for one problem, again and again [ms]. */
