@@ -6,6 +6,7 @@
 #include "view_servo/images/sampling.h"
 
 #include <Eigen/Geometry>
+#include <opencv2/core/hal/intrin.hpp>
 
 #include <algorithm>
 #include <cmath>
@@ -29,6 +30,31 @@ public:
     sum_bb_ += b * b;
     sum_ab_ += a * b;
     ++count_;
+  }
+
+  /** @param count a multiple of four. */
+  void add(const float* a, const float* b, int count)
+  {
+    constexpr int LANES = 4;
+    const cv::v_float32x4 middle = cv::v_setall_f32(MIDDLE);
+    cv::v_float32x4 sums[5] = { cv::v_setzero_f32(), cv::v_setzero_f32(), cv::v_setzero_f32(), cv::v_setzero_f32(),
+                                cv::v_setzero_f32() };
+    for (int i = 0; i < count; i += LANES)
+    {
+      const cv::v_float32x4 x = cv::v_load(a + i) - middle;
+      const cv::v_float32x4 y = cv::v_load(b + i) - middle;
+      sums[0] = sums[0] + x;
+      sums[1] = sums[1] + y;
+      sums[2] = sums[2] + x * x;
+      sums[3] = sums[3] + y * y;
+      sums[4] = sums[4] + x * y;
+    }
+    sum_a_ += cv::v_reduce_sum(sums[0]);
+    sum_b_ += cv::v_reduce_sum(sums[1]);
+    sum_aa_ += cv::v_reduce_sum(sums[2]);
+    sum_bb_ += cv::v_reduce_sum(sums[3]);
+    sum_ab_ += cv::v_reduce_sum(sums[4]);
+    count_ += count;
   }
 
   int count() const
@@ -95,28 +121,45 @@ double sideCorrelation(const cv::Mat& reference, const cv::Mat& current, const E
   const Eigen::Vector3d normal_there = h.leftCols<2>() * normal;
   const BilinearSampler from(reference);
   const BilinearSampler to(current);
+  const auto seen = [&to](const Eigen::Vector3f& there) {
+    return there.z() > 0.0F && to.contains(there.x() / there.z(), there.y() / there.z());
+  };
 
+  // Lines of samples beside the segment, and what the homography makes of them.
+  const double step = (last - first) / ALONG;
+  const Eigen::Vector2f step_here = (step * along).cast<float>();
+  const Eigen::Vector3f step_there = (step * along_there).cast<float>();
+  const double begin = first + 0.5 * step;
+  const Eigen::Vector2f begin_here = (reference_segment.start + begin * along).cast<float>();
+  const Eigen::Vector3f begin_there = (start_there + begin * along_there).cast<float>();
   double best = -1.0;
-  for (const double side : { -1.0, 1.0 })
+  for (const float side : { -1.0F, 1.0F })
   {
     PairedIntensities samples;
-    for (int i = 0; i < ALONG; ++i)
+    for (int j = 0; j < ACROSS; ++j)
     {
-      const double fraction = first + (last - first) * (i + 0.5) / ALONG;
-      const Eigen::Vector2f on_line = (reference_segment.start + fraction * along).cast<float>();
-      const Eigen::Vector3f on_line_there = (start_there + fraction * along_there).cast<float>();
-      const Eigen::Vector2f across = (side * normal).cast<float>();
-      const Eigen::Vector3f across_there = (side * normal_there).cast<float>();
-      for (int j = 0; j < ACROSS; ++j)
+      const float offset = side * (FIRST + STEP * static_cast<float>(j));
+      const Eigen::Vector2f here = begin_here + offset * normal.cast<float>();
+      const Eigen::Vector3f there = begin_there + offset * normal_there.cast<float>();
+      const Eigen::Vector2f end_here = here + (ALONG - 1) * step_here;
+      const Eigen::Vector3f end_there = there + (ALONG - 1) * step_there;
+      if (from.contains(here.x(), here.y()) && from.contains(end_here.x(), end_here.y()) && seen(there) &&
+          seen(end_there))
       {
-        const float offset = FIRST + STEP * static_cast<float>(j);
-        const Eigen::Vector2f at = on_line + offset * across;
-        const Eigen::Vector3f seen = on_line_there + offset * across_there;
-        const float scale = 1.0F / seen.z();
-        const Eigen::Vector2f there = scale * seen.head<2>();
-        if (seen.z() > 0.0F && from.contains(at.x(), at.y()) && to.contains(there.x(), there.y()))
+        float values_here[ALONG];
+        float values_there[ALONG];
+        from.alongLine(here, step_here, ALONG, values_here);
+        to.alongLine(there, step_there, ALONG, values_there);
+        samples.add(values_here, values_there, ALONG);
+        continue;
+      }
+      for (int i = 0; i < ALONG; ++i)
+      {
+        const Eigen::Vector2f at = here + static_cast<float>(i) * step_here;
+        const Eigen::Vector3f at_there = there + static_cast<float>(i) * step_there;
+        if (from.contains(at.x(), at.y()) && seen(at_there))
         {
-          samples.add(from.at(at.x(), at.y()), to.at(there.x(), there.y()));
+          samples.add(from.at(at.x(), at.y()), to.at(at_there.x() / at_there.z(), at_there.y() / at_there.z()));
         }
       }
     }

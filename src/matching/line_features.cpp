@@ -95,27 +95,57 @@ LineFeatures::LineFeatures(const cv::Mat& grey, Segments segments, const LineFea
   const std::size_t count = static_cast<std::size_t>(std::min(n, params_.max_grouped));
   near_.resize(count);
   meetings_.resize(count);
+  std::vector<Eigen::Vector2d> middles;
+  std::vector<double> halves;
+  for (const Segment& segment : segments_)
+  {
+    middles.push_back(segment.midpoint());
+    halves.push_back(0.5 * segment.length());
+  }
   const double max_distance = params_.groups.max_distance;
   cv::parallel_for_(cv::Range(0, static_cast<int>(count)), [&](const cv::Range& range) {
     std::vector<std::pair<double, int>> distances;
     for (int i = range.start; i < range.end; ++i)
     {
+      // First by what a distance is at least, which is quick to say: few of the others come into question.
+      const Eigen::Vector2d middle = segment(i).midpoint();
+      const double half = 0.5 * segment(i).length();
       distances.clear();
       for (int j = 0; j < n; ++j)
       {
         if (j != i)
         {
-          distances.emplace_back(distanceBetween(segment(i), segment(j)), j);
+          const std::size_t other = static_cast<std::size_t>(j);
+          distances.emplace_back((middles[other] - middle).norm() - half - halves[other], j);
         }
       }
       const std::size_t kept = std::min(static_cast<std::size_t>(params_.neighbours), distances.size());
-      std::partial_sort(distances.begin(), distances.begin() + static_cast<std::ptrdiff_t>(kept), distances.end());
+      const auto end_of_kept = distances.begin() + static_cast<std::ptrdiff_t>(kept);
+      if (kept < distances.size())
+      {
+        std::nth_element(distances.begin(), end_of_kept, distances.end());
+      }
+      double farthest = 0.0;
+      for (auto next = distances.begin(); next != end_of_kept; ++next)
+      {
+        next->first = distanceBetween(segment(i), segment(next->second));
+        farthest = std::max(farthest, next->first);
+      }
+      auto end = end_of_kept;
+      for (auto next = end_of_kept; next != distances.end(); ++next)
+      {
+        if (next->first <= farthest)
+        {
+          *end++ = { distanceBetween(segment(i), segment(next->second)), next->second };
+        }
+      }
+      std::partial_sort(distances.begin(), end_of_kept, end);
       distances.resize(kept);
       std::vector<Meeting>& meetings = meetings_[static_cast<std::size_t>(i)];
       for (const auto& [distance, j] : distances)
       {
         near_[static_cast<std::size_t>(i)].push_back(j);
-        const auto at = lineIntersection(segment(i), segment(j), MIN_ANGLE);
+        const auto at = lineIntersection(segment(i), segment(j), MIN_SINE);
         if (at && static_cast<int>(meetings.size()) < params_.neighbour_pairs &&
             distanceToPoint(segment(i), *at) < max_distance && distanceToPoint(segment(j), *at) < max_distance)
         {

@@ -275,8 +275,8 @@ private:
     Eigen::Vector2d to[4] = { a.current_at, b.current_at };
     double weights[4] = { 1.0, 1.0, 1.0, END_POINT_WEIGHT };
     int n = 3;
-    const auto third = lineIntersection(ra, rb, LineFeatures::MIN_ANGLE);
-    const auto third_current = lineIntersection(ca, cb, LineFeatures::MIN_ANGLE);
+    const auto third = lineIntersection(ra, rb, LineFeatures::MIN_SINE);
+    const auto third_current = lineIntersection(ca, cb, LineFeatures::MIN_SINE);
     if (third && third_current && (*third - a.reference_at).norm() < MAX_REACH)
     {
       from[2] = *third;

@@ -96,20 +96,22 @@ public:
       }
       range.erase(0, odd.size());
     }
+    static const std::regex above(R"((>=|>) (\S+))");
+    static const std::regex between(R"(([[(])(\S+), (\S+)([\])]))");
+    static const std::regex separator(", | or ");
     std::smatch parts;
-    if (std::regex_match(range, parts, std::regex(R"((>=|>) (\S+))")))
+    if (std::regex_match(range, parts, above))
     {
       const double bound = numberOf(parameter, parts[2]);
       return parts[1] == ">" ? value > bound : value >= bound;
     }
-    if (std::regex_match(range, parts, std::regex(R"(([[(])(\S+), (\S+)([\])]))")))
+    if (std::regex_match(range, parts, between))
     {
       const double low = numberOf(parameter, parts[2]);
       const double high = numberOf(parameter, parts[3]);
       return (parts[1] == "[" ? value >= low : value > low) && (parts[4] == "]" ? value <= high : value < high);
     }
     // "4, 6 or 8"
-    const std::regex separator(", | or ");
     return std::any_of(std::sregex_token_iterator(range.begin(), range.end(), separator, -1),
                        std::sregex_token_iterator(),
                        [&](const std::string& word) { return value == numberOf(parameter, word); });

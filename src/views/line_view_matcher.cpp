@@ -211,7 +211,7 @@ public:
             continue;
           }
           const auto at =
-              lineIntersection(to_.segment(match.current), to_.segment(other->current), LineFeatures::MIN_ANGLE);
+              lineIntersection(to_.segment(match.current), to_.segment(other->current), LineFeatures::MIN_SINE);
           if (at)
           {
             found.push_back({ { meeting.at, *at }, std::min(quality(match), quality(*other)), false });

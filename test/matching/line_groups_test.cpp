@@ -136,24 +136,24 @@ TEST(PairIndex, IsInvariantUnderHomographiesThatKeepTheSides)
 TEST(LineIntersection, IsOnBothLinesUnlessTheyAreNearlyParallel)
 {
   const Segment a{ { 0.0, 0.0 }, { 10.0, 0.0 } };
-  const auto at = lineIntersection(a, { { 20.0, 5.0 }, { 21.0, 6.0 } }, 0.1);
+  const auto at = lineIntersection(a, { { 20.0, 5.0 }, { 21.0, 6.0 } }, std::sin(0.1));
   ASSERT_TRUE(at.has_value());
   EXPECT_NEAR(at->x(), 15.0, 1e-9);
   EXPECT_NEAR(at->y(), 0.0, 1e-9);
   const auto turned = [](double angle) {
     return Segment{ { 0.0, 5.0 }, { 100.0 * std::cos(angle), 5.0 + 100.0 * std::sin(angle) } };
   };
-  EXPECT_FALSE(lineIntersection(a, turned(0.0), 0.1).has_value());
-  EXPECT_FALSE(lineIntersection(a, turned(0.099), 0.1).has_value());
-  EXPECT_FALSE(lineIntersection(a, turned(M_PI - 0.099), 0.1).has_value());
-  EXPECT_TRUE(lineIntersection(a, turned(0.101), 0.1).has_value());
+  EXPECT_FALSE(lineIntersection(a, turned(0.0), std::sin(0.1)).has_value());
+  EXPECT_FALSE(lineIntersection(a, turned(0.099), std::sin(0.1)).has_value());
+  EXPECT_FALSE(lineIntersection(a, turned(M_PI - 0.099), std::sin(0.1)).has_value());
+  EXPECT_TRUE(lineIntersection(a, turned(0.101), std::sin(0.1)).has_value());
 }
 
 RC_GTEST_PROP(PairHypotheses, WeightsSumToOne, (std::uint64_t seed))
 {
   std::mt19937_64 rng(seed);
   const Segments segments = randomSegments(rng, 2);
-  const auto at = lineIntersection(segments[0], segments[1], 0.1);
+  const auto at = lineIntersection(segments[0], segments[1], std::sin(0.1));
   double sum = 0.0;
   for (const PairHypothesis& hypothesis : pairHypotheses(segments[0], segments[1], at, 2.0))
   {

@@ -50,6 +50,8 @@ public:
 
   /** at() at `count` places, first + i step; `values` has to hold so many. */
   void alongLine(const Eigen::Vector2f& first, const Eigen::Vector2f& step, int count, float* values) const;
+  /** The same with homogeneous coordinates, all of positive third coordinate: a line that a homography maps here. */
+  void alongLine(const Eigen::Vector3f& first, const Eigen::Vector3f& step, int count, float* values) const;
 
 private:
   const unsigned char* data_;

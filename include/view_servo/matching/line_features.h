@@ -50,7 +50,7 @@ public:
     Eigen::Vector2d at;  ///< intersection of the two lines [px]
   };
 
-  static constexpr double MIN_ANGLE = 0.2;  ///< least angle between lines that count as meeting [rad]
+  static constexpr double MIN_SINE = 0.198669331;  ///< of the least angle between lines that count as meeting, 0.2 rad
 
   /**
    * @param grey 8-bit, one channel.

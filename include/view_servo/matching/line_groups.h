@@ -63,8 +63,8 @@ constexpr int PAIR_INDICES = 81;
  */
 int pairIndex(const Segment& a, const Segment& b, double collinearity);
 
-/** Intersection of the lines through two segments; empty when they are parallel within `min_angle` [rad]. */
-std::optional<Eigen::Vector2d> lineIntersection(const Segment& a, const Segment& b, double min_angle);
+/** Intersection of the lines through two segments; empty when the sine of their angle is at most `min_sine`. */
+std::optional<Eigen::Vector2d> lineIntersection(const Segment& a, const Segment& b, double min_sine);
 
 /** One of the structures that a pair may have had before its segments were broken up, and how likely it is. */
 struct PairHypothesis
