@@ -6,6 +6,8 @@
 #include "view_servo/robust/random.h"
 #include "view_servo/robust/view_consistency.h"
 
+#include <Eigen/Geometry>
+
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -28,6 +30,22 @@ double costAtAllScales(const Eigen::Matrix3d& matrix, const Correspondences& pai
     }
   }
   return cost;
+}
+
+/**
+ * Whether all pairs can lie in front of both cameras: the epipolar line of each points the same way as the line from
+ * the epipole to its point (Chum, Werner & Matas 2004). Most samples with an outlier fail.
+ */
+bool hasOneOrientation(const Eigen::Matrix3d& f, const Correspondences& pairs)
+{
+  const Eigen::Vector3d epipole = currentEpipole(f);
+  int positive = 0;
+  for (const Correspondence& pair : pairs)
+  {
+    const Eigen::Vector3d line = f * pair.reference.homogeneous();
+    positive += line.dot(epipole.cross(pair.current.homogeneous())) > 0.0 ? 1 : 0;
+  }
+  return positive == 0 || positive == static_cast<int>(pairs.size());
 }
 
 /** Those within three standard deviations, which the median distance tells. */
@@ -74,8 +92,14 @@ bool FundamentalEstimator::accepts(const std::vector<int>& sample) const
 
 void FundamentalEstimator::solve(const std::vector<int>& sample, std::vector<Model>& models) const
 {
-  const std::vector<Model> solutions = fundamentalFromSevenPoints(select(pairs_, sample));
-  models.insert(models.end(), solutions.begin(), solutions.end());
+  const Correspondences pairs = select(pairs_, sample);
+  for (const Model& solution : fundamentalFromSevenPoints(pairs))
+  {
+    if (hasOneOrientation(solution, pairs))
+    {
+      models.push_back(solution);
+    }
+  }
 }
 
 double FundamentalEstimator::error(const Model& model, std::size_t i) const
@@ -86,7 +110,7 @@ double FundamentalEstimator::error(const Model& model, std::size_t i) const
 std::optional<FundamentalEstimator::Model> FundamentalEstimator::refit(const Model& /*model*/,
                                                                        const std::vector<int>& inliers) const
 {
-  constexpr int ITERATIONS = 5;
+  constexpr int ITERATIONS = 2;
   const Correspondences pairs = select(pairs_, inliers);
   const auto linear = fundamentalFromPoints(pairs);
   if (!linear)

@@ -124,6 +124,10 @@ public:
     if (estimator_.size() >= SIZE)
     {
       statistics().stop = drawSamples();
+      if (statistics().iterations < FIRST_OPTIMIZED && to_optimize_)
+      {
+        optimizeLocally(*to_optimize_);
+      }
       if (params_.improvement_stage && result_.model)
       {
         replaceSampleData();
@@ -144,6 +148,7 @@ public:
 
 private:
   static constexpr std::size_t SIZE = Estimator::SAMPLE_SIZE;
+  static constexpr int FIRST_OPTIMIZED = 50;  ///< at so many samples, the best so far; before, nearly each is the best
 
   RansacStatistics& statistics()
   {
@@ -173,7 +178,12 @@ private:
         continue;
       }
       ++statistics().iterations;
-      if (trySample(sample))
+      bool improved = trySample(sample);
+      if (statistics().iterations == FIRST_OPTIMIZED && to_optimize_)
+      {
+        improved = optimizeLocally(*to_optimize_) || improved;
+      }
+      if (improved)
       {
         consensus_.findInliers(*result_.model, 1.0, inliers_);
         required = requiredSamples(sampler_.share(inliers_), Estimator::SAMPLE_SIZE, params_.confidence);
@@ -207,7 +217,10 @@ private:
     }
   }
 
-  /** Solves and scores a sample; optimises it locally when it is the best so far. Whether the result improved. */
+  /**
+   * Solves and scores a sample; optimises it locally when it is the best so far, unless it is one of the first, of which
+   * only the best is. Whether the result improved.
+   */
   bool trySample(const std::vector<int>& sample)
   {
     models_.clear();
@@ -231,6 +244,11 @@ private:
     consensus_.findInliers(*best, 1.0, inliers_);
     consensus_.setBest(inliers_);
     const bool improved = keepIfBetter(*best, sample_cost_);
+    if (statistics().iterations < FIRST_OPTIMIZED)
+    {
+      to_optimize_ = *best;
+      return improved;
+    }
     return optimizeLocally(*best) || improved;
   }
 
@@ -294,6 +312,7 @@ private:
   Rng& rng_;
   RansacResult<Model> result_;
   std::vector<int> best_sample_;
+  std::optional<Model> to_optimize_;                              ///< the best of the first samples
   double sample_cost_ = std::numeric_limits<double>::infinity();  ///< of the best sample, before local optimisation
   std::vector<Model> models_;                                     ///< of one sample
   std::vector<int> inliers_;                                      ///< scratch
