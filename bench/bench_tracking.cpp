@@ -485,13 +485,13 @@ VideoTruth readVideoTruth(const std::filesystem::path& file)
     Eigen::Matrix<double, 9, 1> h;
     Eigen::Matrix<double, 8, 1> corners;
     words >> frame;
-    for (double& value : h)
+    for (Eigen::Index i = 0; i < h.size(); ++i)
     {
-      words >> value;
+      words >> h(i);
     }
-    for (double& value : corners)
+    for (Eigen::Index i = 0; i < corners.size(); ++i)
     {
-      words >> value;
+      words >> corners(i);
     }
     if (!words || frame != static_cast<int>(truth.h.size()))
     {
