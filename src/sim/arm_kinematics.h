@@ -20,7 +20,7 @@ struct ArmKinematicsParams
   double damping = 0.05;                              ///< of the inverse at a singularity
   double min_manipulability = 0.02;                   ///< smallest singular value of the Jacobian that needs no damping
 
-  /** All faults, one a line; empty when the parameters are usable. */
+  /** Each fault in one line, those of nested parameters included; empty when the parameters are usable. */
   std::vector<std::string> validate() const;
 };
 

@@ -32,7 +32,7 @@ struct NomadParams
   double odometry_noise = 0.0;         ///< standard deviation of measured motion, as a part of it
   std::uint64_t seed = 1;              ///< of odometry's noise
 
-  /** All faults, one a line; empty when the parameters are usable. */
+  /** Each fault in one line, those of nested parameters included; empty when the parameters are usable. */
   std::vector<std::string> validate() const;
 };
 

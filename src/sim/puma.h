@@ -25,7 +25,7 @@ struct PumaParams : ArmKinematicsParams
   double hand_eye_rotation_error = 0.0;     ///< by what angle it is turned against the URDF [rad]
   std::uint64_t seed = 1;                   ///< of the encoders' noise, and of the hand-eye error's directions
 
-  /** All faults, one a line; empty when the parameters are usable. */
+  /** Each fault in one line, those of nested parameters included; empty when the parameters are usable. */
   std::vector<std::string> validate() const;
 };
 

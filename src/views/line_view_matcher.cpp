@@ -604,7 +604,7 @@ ViewMatch LineViewMatcher::match(const PreparedImage& reference, const PreparedI
   }
   if (result.outcome != MatchOutcome::MATCHED)
   {
-    result.message += noteOfLight(reference, current);
+    result.message += exposureNote(reference, current);
   }
   result.stages.insert(result.stages.begin(), stages.begin(), stages.end());
   result.elapsed_ms = clock.total();

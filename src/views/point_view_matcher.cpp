@@ -546,10 +546,10 @@ std::string whyNot(Refusal refusal, const PreparedImage& reference, const Prepar
   {
     return "too few corners: " + std::to_string(reference.points(0).corners.size()) + " in the reference, " +
            std::to_string(current.points(0).corners.size()) + " in the current image, " + std::to_string(MIN_CORNERS) +
-           " needed in each" + noteOfLight(reference, current);
+           " needed in each" + exposureNote(reference, current);
   }
   return "no geometry found: the " + std::to_string(result.matches.size()) +
-         " candidate matches do not support one better than chance would" + noteOfLight(reference, current);
+         " candidate matches do not support one better than chance would" + exposureNote(reference, current);
 }
 
 }  // namespace

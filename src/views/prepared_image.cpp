@@ -172,7 +172,7 @@ const LineFeatures& PreparedImage::lines() const
   return *lines_;
 }
 
-std::string noteOfLight(const PreparedImage& reference, const PreparedImage& current)
+std::string exposureNote(const PreparedImage& reference, const PreparedImage& current)
 {
   std::string note;
   for (const auto& [image, name] : { std::pair(&reference, "reference"), std::pair(&current, "current image") })

@@ -635,7 +635,8 @@ ViewMatch SceneMatcher::match(const PreparedImage& reference, const PreparedImag
   else
   {
     result.message = "no geometry found: the " + std::to_string(result.matches.size()) +
-                     " candidate matches do not support one better than chance would" + noteOfLight(reference, current);
+                     " candidate matches do not support one better than chance would" +
+                     exposureNote(reference, current);
   }
   result.elapsed_ms = clock.total();
   return result;

@@ -25,11 +25,11 @@ double gradientSimilarity(const cv::Mat& reference, const cv::Mat& current);
 struct ArrivalDetectorParams
 {
   double rise = 1.0;  ///< a rise of the similarity counts as sudden above so many standard deviations of those before
-  double min_rise = 0.08;  ///< least rise that counts as sudden, however little they deviate [similarity]
+  double min_rise = 0.08;  ///< a smaller rise never counts as sudden, however small that standard deviation is
   double drop = 0.1;       ///< the view has been passed when the similarity has lost this part of its rise again
   int min_history = 5;     ///< similarities that must be known before a rise counts
 
-  /** All faults, one a line; empty when the parameters are usable. */
+  /** Each fault in one line, those of nested parameters included; empty when the parameters are usable. */
   std::vector<std::string> validate() const;
 };
 

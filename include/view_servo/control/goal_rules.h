@@ -38,8 +38,8 @@ struct Circumstances
   double timeout = 0.0;        ///< time limit of the goal [s]
   std::string fault;  ///< why the driver's state cannot be trusted any more: time went back, an exception; empty: none
   std::string missing_input;  ///< which input does not come, and since when; empty: all come
+  double missing_for = 0.0;   ///< time since the missing input last came [s]; meaningless while all come
   std::string held;           ///< why the robot has to stand although all inputs come; empty: it need not
-  double missing_for = 0.0;   ///< time since it last came [s]
   double patience = 0.0;      ///< a goal ends when an input is missing for longer than this [s]
 };
 

@@ -35,7 +35,7 @@ struct HeadingHypothesesParams
   double assumed_distance = 1.0;  ///< distance of the view until it is known [m]
   std::uint64_t seed = 1;         ///< fixes all random draws
 
-  /** All faults, one a line; empty when the parameters are usable. */
+  /** Each fault in one line, those of nested parameters included; empty when the parameters are usable. */
   std::vector<std::string> validate() const;
 };
 
@@ -50,7 +50,7 @@ struct HeadingHypothesis
    * camera is assumed at first, and later follows from odometry and that assumption.
    */
   PlanarPose view_in_odom;
-  /** Pose of the view's level camera in the level camera of the last set of matches, scaled to distance 1. */
+  /** The same in the level frame that the camera had at the last set of matches, scaled to distance 1. */
   PlanarPose view_in_camera;
   /** After each set: the weight before it times `memory`, plus the share of its matches that agree, if enough do. */
   double weight = 0.0;

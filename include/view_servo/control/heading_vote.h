@@ -32,7 +32,7 @@ struct HeadingVoteParams
   double widening = 1.3;        ///< factor of the region's width when it is outside
   double min_half_width = 0.1;  ///< of the region [rad]
 
-  /** All faults, one a line; empty when the parameters are usable. */
+  /** Each fault in one line, those of nested parameters included; empty when the parameters are usable. */
   std::vector<std::string> validate() const;
 };
 

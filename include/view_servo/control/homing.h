@@ -57,7 +57,7 @@ struct HomingParams
   double near_step = 0.01;   ///< the same after the rise of the correlation [m]
   double step_speed = 0.08;  ///< [m/s]
 
-  /** All faults, one a line; empty when the parameters are usable. */
+  /** Each fault in one line, those of nested parameters included; empty when the parameters are usable. */
   std::vector<std::string> validate() const;
 };
 
@@ -78,7 +78,7 @@ enum class HomingState
 /** What homing knows after an image; numbers that it does not know are NaN. */
 struct HomingReport
 {
-  double stamp = 0.0;  ///< of the last image [s]
+  double stamp = 0.0;  ///< stamp of the last image [s]; 0 before the first
   HomingState state = HomingState::ACQUIRING;
   std::string reason;     ///< of the state, in one line
   std::string manoeuvre;  ///< what a base that cannot slide does at the moment; empty: nothing worth a word
@@ -94,9 +94,9 @@ struct HomingReport
   double confidence = 0.0;
   /** HeadingHistogram::votesFor() base_link, of the last matches used; empty before. */
   std::vector<double> histogram;
-  /** Smallest heading in base_link at which the view is expected next [rad]. */
+  /** Rightmost heading in base_link at which the view is expected next, positive to the left, >= -pi/2 [rad]. */
   double roi_min = std::numeric_limits<double>::quiet_NaN();
-  double roi_max = std::numeric_limits<double>::quiet_NaN();     ///< the largest such heading [rad]
+  double roi_max = std::numeric_limits<double>::quiet_NaN();     ///< the leftmost, <= pi/2 [rad]
   double similarity = std::numeric_limits<double>::quiet_NaN();  ///< gradientSimilarity(), in [-1, 1]
   /**
    * Median distance of the view's points from their places in the view, in the last image in which they were found

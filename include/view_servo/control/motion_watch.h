@@ -21,9 +21,9 @@ public:
   void addCommand(double time, const BaseVelocity& velocity);
 
   /**
-   * Odometry has come.
-   * @return one sentence where both have disagreed for WINDOW: that the base does not move, moves otherwise or the other
-   * way round. Empty while they agree, and while the base is told to stand.
+   * Takes the pose of the base in odometry's frame at a time [s].
+   * @return one sentence when odometry has disagreed with the commands for 2 s: that the base does not move, moves in
+   * another direction or in the opposite one. Empty while they agree, and while zero is commanded.
    */
   std::string addOdometry(double time, const PlanarPose& base_in_odom);
 

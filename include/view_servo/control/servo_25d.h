@@ -23,7 +23,7 @@ struct Servo25dParams
 {
   double gain = 1.0;                     ///< rate at which a large error decays [1/s]
   double near_gain = 2.5;                ///< rate at which a small error decays [1/s]
-  double margin = 0.1;                   ///< part of the image at each border that the chosen point stays out of
+  double margin = 0.1;                   ///< strip along each border without the chosen point, over the image's size
   double distance = 0.5;                 ///< d: distance of the plane from the stored view, until it is known [m]
   double translation_tolerance = 0.001;  ///< error of the camera's position at which it has converged [m]
   double rotation_tolerance = 0.0015;    ///< error of its rotation at which it has converged [rad]
@@ -31,7 +31,7 @@ struct Servo25dParams
   double loss_tolerance = 0.12;          ///< time without the view that sent commands bridge; then it stands [s]
   double lost_timeout = 5.0;             ///< servoing gives up after this time without the view [s]
 
-  /** All faults, one a line; empty when the parameters are usable. */
+  /** Each fault in one line, those of nested parameters included; empty when the parameters are usable. */
   std::vector<std::string> validate() const;
 };
 

@@ -26,7 +26,7 @@ struct VelocityLimits
   double max_acceleration = 0.5;       ///< [m/s²]
   double max_turn_acceleration = 1.0;  ///< [rad/s²]
 
-  /** All faults, one a line; empty when the parameters are usable. */
+  /** Each fault in one line, those of nested parameters included; empty when the parameters are usable. */
   std::vector<std::string> validate() const;
 };
 

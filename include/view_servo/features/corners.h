@@ -23,7 +23,7 @@ struct CornerParams
   double relative_threshold = 0.0;  ///< weaker corners are left out: smallest response, as a fraction of the strongest
   int border = 4;                   ///< no corners closer than this to the image's border [px]
 
-  /** All faults, one a line; empty when the parameters are usable. */
+  /** Each fault in one line, those of nested parameters included; empty when the parameters are usable. */
   std::vector<std::string> validate() const;
 };
 

@@ -20,7 +20,7 @@ struct EdgeParams
   double high_threshold = 4.0;  ///< least gradient of one pixel of a chain [grey levels/px]
   int min_points = 5;           ///< pixels of the shortest chain that is kept
 
-  /** All faults, one a line; empty when the parameters are usable. */
+  /** Each fault in one line, those of nested parameters included; empty when the parameters are usable. */
   std::vector<std::string> validate() const;
 };
 

@@ -34,7 +34,7 @@ struct LineSegmentParams
   double min_length = 15.0;        ///< shorter segments are left out [px]
   int max_segments = 1000;         ///< the longest are kept
 
-  /** All faults, one a line; empty when the parameters are usable. */
+  /** Each fault in one line, those of nested parameters included; empty when the parameters are usable. */
   std::vector<std::string> validate() const;
 };
 

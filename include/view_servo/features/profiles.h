@@ -29,7 +29,7 @@ struct ProfileParams
   int coefficients = 8;       ///< N_f: number of Fourier features of a profile: 4, 6 or 8
   double min_contrast = 6.0;  ///< profiles that differ less than this from their mean are left out [grey levels]
 
-  /** All faults, one a line; empty when the parameters are usable. */
+  /** Each fault in one line, those of nested parameters included; empty when the parameters are usable. */
   std::vector<std::string> validate() const;
 };
 

@@ -37,8 +37,8 @@ std::vector<PlanarPose> planarMotionFromTwoPoints(const Correspondence& first, c
 /** What a correspondence and a motion say of the depth z of a point in the reference camera. */
 struct InverseDepth
 {
-  double value = 0.0;        ///< 1 / z, z in the unit of the pose; negative: the point would lie behind a camera
-  double information = 0.0;  ///< squared shift of the current level point for a unit of `value`; 0: depth unknown
+  double value = 0.0;        ///< 1 / z, z in the unit of the translation; negative: behind the reference camera
+  double information = 0.0;  ///< squared derivative of the current level point by `value`; 0: depth unknown
 };
 InverseDepth inverseDepth(const Correspondence& pair, const PlanarPose& reference_in_current);
 /** The same for any motion X_cur = R X_ref + t. */

@@ -50,7 +50,10 @@ public:
 
   /** at() at `count` places, first + i step; `values` has to hold so many. */
   void alongLine(const Eigen::Vector2f& first, const Eigen::Vector2f& step, int count, float* values) const;
-  /** The same with homogeneous coordinates, all of positive third coordinate: a line that a homography maps here. */
+  /**
+   * The same for places in homogeneous coordinates, as on a line that a homography maps into this image. Their third
+   * coordinates must be positive, which is not checked.
+   */
   void alongLine(const Eigen::Vector3f& first, const Eigen::Vector3f& step, int count, float* values) const;
 
 private:

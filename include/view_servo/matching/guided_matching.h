@@ -20,7 +20,7 @@ struct GuidedParams
   int patch_radius = 6;          ///< patches of (2 r + 1)² pixels are compared [px]
   double min_correlation = 0.6;  ///< least correlation of the current patch with the warped reference patch
 
-  /** All faults, one a line; empty when the parameters are usable. */
+  /** Each fault in one line, those of nested parameters included; empty when the parameters are usable. */
   std::vector<std::string> validate() const;
 };
 

@@ -23,10 +23,10 @@ struct LineFeatureParams
 {
   LineGroupParams groups;
   int max_grouped = 400;     ///< only so many segments, the longest, form groups and start regions
-  int neighbours = 40;       ///< number of nearest segments kept for each, by which a hypothesis is judged
-  int neighbour_pairs = 15;  ///< at most so many of these, whose lines meet its line, form hypotheses with it
+  int neighbours = 40;       ///< nearest segments kept for each, see near(): regions of matches begin among them
+  int neighbour_pairs = 15;  ///< at most so many of these, whose lines meet its own, are kept, see meetings()
 
-  /** All faults, one a line; empty when the parameters are usable. */
+  /** Each fault in one line, those of nested parameters included; empty when the parameters are usable. */
   std::vector<std::string> validate() const;
 };
 

@@ -46,7 +46,7 @@ struct LineGroupParams
   int max_neighbours = 15;      ///< most pairs that a segment forms, the closest ones; 0 = no limit
   double min_weight = 0.1;      ///< structures less likely than this are left out
 
-  /** All faults, one a line; empty when the parameters are usable. */
+  /** Each fault in one line, those of nested parameters included; empty when the parameters are usable. */
   std::vector<std::string> validate() const;
 };
 

@@ -35,7 +35,7 @@ struct LineRegionParams
   double min_correlation = 0.55;      ///< least sideCorrelation() of a match
   double min_mean_correlation = 0.6;  ///< least mean of a region's matches
 
-  /** All faults, one a line; empty when the parameters are usable. */
+  /** Each fault in one line, those of nested parameters included; empty when the parameters are usable. */
   std::vector<std::string> validate() const;
 };
 

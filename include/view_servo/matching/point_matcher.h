@@ -35,7 +35,7 @@ struct PointMatcherParams
   /** Entries that are aligned: so many of each row and of each column, those of most votes; 0 = all. */
   int cyclic_entries = 5;
 
-  /** All faults, one a line; empty when the parameters are usable. */
+  /** Each fault in one line, those of nested parameters included; empty when the parameters are usable. */
   std::vector<std::string> validate() const;
 };
 

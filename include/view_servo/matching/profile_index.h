@@ -29,7 +29,7 @@ struct ProfileSearchParams
   double epsilon = 2.0;  ///< a neighbour found is at most (1 + epsilon) times farther than the true one (NEAREST)
   double share = 1.0;    ///< part of the current profiles that vote: those whose feature vectors are longest
 
-  /** All faults, one a line; empty when the parameters are usable. */
+  /** Each fault in one line, those of nested parameters included; empty when the parameters are usable. */
   std::vector<std::string> validate() const;
 };
 

@@ -25,7 +25,7 @@ struct LinePlaneParams
   int min_lines = 8;       ///< least number of lines that make a plane
   int max_planes = 4;      ///< at most so many planes are looked for
 
-  /** All faults, one a line; empty when the parameters are usable. */
+  /** Each fault in one line, those of nested parameters included; empty when the parameters are usable. */
   std::vector<std::string> validate() const;
 };
 

@@ -33,7 +33,7 @@ struct MultiHypothesisParams
   int entries_per_row = 10;         ///< associations kept of each reference point, the strongest (9.5)
   double association_weight = 3.0;  ///< lambda of 9.6.3: what the strongest association adds to a match [px]
 
-  /** All faults, one a line; empty when the parameters are usable. */
+  /** Each fault in one line, those of nested parameters included; empty when the parameters are usable. */
   std::vector<std::string> validate() const;
 };
 

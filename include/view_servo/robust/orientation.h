@@ -7,8 +7,9 @@
 namespace view_servo
 {
 /**
- * Whether most matches keep the sense of rotation of neighbouring points. In a mirrored image (a plane seen from behind)
- * they reverse it, which a fundamental matrix alone can not tell.
+ * Whether, for most points, the triangle of the point and its two nearest neighbours turns the same way in both images,
+ * clockwise or counter-clockwise. In a mirrored image (a plane seen from behind) it turns the other way, which a
+ * fundamental matrix alone cannot tell. False on a tie, and for fewer than three pairs.
  */
 bool keepsOrientation(const Correspondences& pairs);
 

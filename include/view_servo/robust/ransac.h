@@ -25,7 +25,7 @@ struct RansacParams
   bool improvement_stage = false;  ///< thesis 9.4: replace each datum of the best sample by others in turn
   Sampling sampling = Sampling::PROGRESSIVE;  ///< how samples are drawn from the data
 
-  /** All faults, one a line; empty when the parameters are usable. */
+  /** Each fault in one line, those of nested parameters included; empty when the parameters are usable. */
   std::vector<std::string> validate() const;
 };
 
@@ -55,7 +55,10 @@ struct RansacResult
 {
   std::optional<Model> model;  ///< empty: no sample gave a model
   std::vector<int> inliers;    ///< indices of the data within the threshold, ascending
-  /** Of the model, by the Consensus; with MSAC the sum over all data of min(error(), threshold²) [px²]. */
+  /**
+   * Cost of the model as the Consensus computes it, the smaller the better; with MSAC the sum over all data of
+   * min(error(), inlier_threshold²) [px²]. Without a model: Consensus::costOfNone().
+   */
   double cost = 0.0;
   RansacStatistics statistics;
 };

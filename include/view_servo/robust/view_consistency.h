@@ -25,7 +25,7 @@ struct ViewConsistencyParams
   double mean_increments = 100.0;  ///< groups are drawn until the candidates were counted this often on average
   int max_groups = 200000;         ///< groups drawn at most
 
-  /** All faults, one a line; empty when the parameters are usable. */
+  /** Each fault in one line, those of nested parameters included; empty when the parameters are usable. */
   std::vector<std::string> validate() const;
 };
 

@@ -35,9 +35,7 @@ namespace view_servo
  * Between the core's types and messages. All results are copies: they do not refer to their source.
  */
 
-/**
- * A time [s] as a stamp. Times outside the range of stamps become the nearest within, and times that are not finite 0.
- */
+/** A time [s] as a stamp: clamped to the range of stamps, and 0 when it is not finite. */
 ros::Time toStamp(double seconds);
 
 /** Whether two calibrations are the same; headers are not compared. */
@@ -48,6 +46,7 @@ bool sameCalibration(const sensor_msgs::CameraInfo& a, const sensor_msgs::Camera
  * into account, so that they hold for the pixels of that image.
  */
 Camera toCamera(const sensor_msgs::CameraInfo& info);
+/** A calibration for the pixels of the camera's images: without binning and region of interest. */
 sensor_msgs::CameraInfo toCameraInfo(const Camera& camera, const std_msgs::Header& header);
 
 /**
@@ -80,7 +79,10 @@ void copyRowMajor(const Eigen::Matrix3d& matrix, Array& array)
 /** Matrices one after the other, nine numbers each, row by row. */
 std::vector<double> toRowMajor(const std::vector<Eigen::Matrix3d>& matrices);
 
-/** State TRACKING and valid when `match` found a homography, else SEARCHING; not decomposed. */
+/**
+ * A message about a plane that matching looked for: TRACKING and valid with the homography when `match` found one, else
+ * SEARCHING. What would follow from a decomposition (rotation, translation, normal) is left NaN.
+ */
 Homography toHomography(const ViewMatch& match, const std::string& view, const std_msgs::Header& header);
 
 /** The same for a tracked plane, with what is known of motion and plane. @param reason why it is not tracked. */

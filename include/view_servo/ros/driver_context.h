@@ -95,7 +95,7 @@ public:
   /** What is missing, in one line; empty: nothing. */
   std::string missing() const;
 
-  /** Time since something that can be used came, or since the goal began [s]. */
+  /** Time since the last message that can be used, or since the last restart(), whichever was later [s]. */
   double age() const
   {
     return watch_.age();

@@ -38,11 +38,11 @@ struct HomingDriverParams
    * none.
    */
   std::string view;
-  std::string base_frame = "base_link";  ///< the base's frame, in which commands are
-  double image_timeout = 0.25;           ///< the base stands when no image has come for so long [s]
-  double odometry_timeout = 0.25;        ///< the base stands when no odometry has come for so long [s]
+  std::string base_frame = "base_link";  ///< tf frame of the base, in which commands are expressed
+  double image_timeout = 0.25;           ///< the base is stopped when no image has come for this time [s]
+  double odometry_timeout = 0.25;        ///< the base is stopped when no odometry has come for this time [s]
   double odometry_delay = 0.0;           ///< odometry's stamps are later than images' of the same moment by this [s]
-  double match_timeout = 0.25;           ///< the base stands when it needs matches and none have come for so long [s]
+  double match_timeout = 0.25;  ///< before it follows points, the base is stopped without matches for this time [s]
   HomingParams homing;
   VelocityLimits limits;
 
@@ -56,7 +56,7 @@ struct HomingDriverParams
   {
     return homing.lost_timeout;
   }
-  /** All faults, one a line; empty when the parameters are usable. */
+  /** Each fault in one line, those of nested parameters included; empty when the parameters are usable. */
   std::vector<std::string> validate() const;
 };
 
@@ -68,10 +68,10 @@ struct ServoDriverParams
   DriverParams node;
   std::filesystem::path views_dir;   ///< directory of the stored views; empty: as viewsDir() says
   double acquire_timeout = 15.0;     ///< a goal ends when the view has not been found after this time [s]
-  double homography_timeout = 0.25;  ///< the arm stands when no homography has come for so long [s]
+  double homography_timeout = 0.25;  ///< the arm is stopped when no homography has come for this time [s]
   double max_homography_age = 0.5;   ///< homographies of older images are not used [s]
   double joint_margin = 0.02;        ///< a goal ends when a joint comes this near to its limit [rad or m]
-  double joint_timeout = 1.0;        ///< the arm stands when joint states have ceased for so long [s]
+  double joint_timeout = 1.0;        ///< the arm is stopped when joint states have ceased for this time [s]
   Servo25dParams servo;
   VelocityLimits limits = ARM_LIMITS;
 

@@ -51,7 +51,7 @@ public:
     GONE_BACK  ///< time has gone back: what was before is to be forgotten, and this stamp is the newest
   };
 
-  /** Where a stamp is in the order. */
+  /** Takes the stamp of the next message and says where it is in the order of those before it. */
   Place check(const ros::Time& stamp);
 
   /** The newest stamp; zero without any. */

@@ -20,7 +20,7 @@ struct ViewStoreNodeParams
   ImageSourceParams sources;
   std::string fixed_frame = "odom";  ///< frame in which the camera's pose is stored with a view; empty: never
 
-  /** All faults, one a line; empty when the parameters are usable. */
+  /** Each fault in one line, those of nested parameters included; empty when the parameters are usable. */
   std::vector<std::string> validate() const;
 };
 
@@ -36,7 +36,7 @@ struct HomographyTrackerNodeParams
   double match_period = 0.3;        ///< time from one search for the view to the next [s]
   PointViewMatcherParams matching;  ///< in the sub-namespace `matching`; read and checked by themselves
 
-  /** All faults, one a line; empty when the parameters are usable. */
+  /** Each fault in one line, those of nested parameters included; empty when the parameters are usable. */
   std::vector<std::string> validate() const;
 };
 

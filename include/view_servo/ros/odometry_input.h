@@ -34,7 +34,11 @@ struct OdometryReading
 class OdometryReader
 {
 public:
-  /** @param input is told of each message. @param delay see `~odometry_delay` [s]. Both references are kept. */
+  /**
+   * @param input accepts or rejects each message. @param base_frame tf frame whose pose is read.
+   * @param delay by which odometry's stamps are later than those of images of the same moment [s].
+   * References to `input` and `transforms` are kept, which must outlive the reader.
+   */
   OdometryReader(DriverInput& input, const TransformSource& transforms, std::string base_frame, double delay);
 
   /** @param publishers number of nodes that publish odometry. @return empty when the message was rejected. */

@@ -50,7 +50,7 @@ struct StreamingMatcherParams
   std::string view;   ///< stored view that camera images are matched with; empty: none
   double rate = 5.0;  ///< camera images are matched at most this often [Hz]
 
-  /** All faults, one a line; empty when the parameters are usable. */
+  /** Each fault in one line, those of nested parameters included; empty when the parameters are usable. */
   std::vector<std::string> validate() const;
 };
 

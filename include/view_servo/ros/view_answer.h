@@ -31,6 +31,7 @@ public:
     return add(message.view, message.goal, message.refused != 0, message.reason);
   }
 
+  /** The name of the wanted view, as given to want(). */
   const std::string& view() const
   {
     return view_;

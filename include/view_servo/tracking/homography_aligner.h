@@ -28,7 +28,7 @@ struct HomographyAlignerParams
   double min_support = 0.25;  ///< least part of the points in sight that has to support the homography
   bool refine = true;         ///< whether all pixels of the region refine the result
 
-  /** All faults, one a line; empty when the parameters are usable. */
+  /** Each fault in one line, those of nested parameters included; empty when the parameters are usable. */
   std::vector<std::string> validate() const;
 };
 

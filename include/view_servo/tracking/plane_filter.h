@@ -31,7 +31,7 @@ struct PlaneFilterParams
    */
   double decision = 4.0;
 
-  /** All faults, one a line; empty when the parameters are usable. */
+  /** Each fault in one line, those of nested parameters included; empty when the parameters are usable. */
   std::vector<std::string> validate() const;
 };
 

@@ -24,7 +24,7 @@ struct PlaneTrackerParams
   PlaneFilterParams filter;
   int lost_after = 5;  ///< the plane is lost after this many images in a row without it
 
-  /** All faults, one a line; empty when the parameters are usable. */
+  /** Each fault in one line, those of nested parameters included; empty when the parameters are usable. */
   std::vector<std::string> validate() const;
 };
 

@@ -26,12 +26,12 @@ struct ViewTrackerParams
   /** Largest distance between where a supporting point is found and where the pose sends it [px] */
   double max_residual = 2.0;
   int min_supporting = 15;    ///< least number of points that support a pose
-  double min_support = 0.35;  ///< least part of the points looked for that has to support the pose
+  double min_support = 0.35;  ///< least share of the points looked for that have to support the pose, (0, 1]
   /** Points whose change of size differs by more than this part from the typical one are left out. */
   double max_scale_difference = 0.35;
   double assumed_depth = 2.5;  ///< depth of points while nothing is known of it [m]
 
-  /** All faults, one a line; empty when the parameters are usable. */
+  /** Each fault in one line, those of nested parameters included; empty when the parameters are usable. */
   std::vector<std::string> validate() const;
 };
 
@@ -112,7 +112,10 @@ public:
    */
   double shareInSight(const PlanarPose& view_in_camera) const;
 
-  /** The pose from matches (level points) of landmarks, without a prediction. */
+  /**
+   * The pose from matches (level points) without a prediction. Only matches whose reference point lies at a landmark
+   * count; Result::found is false when too few of them agree.
+   */
   Result locate(const Correspondences& matches) const;
 
 private:

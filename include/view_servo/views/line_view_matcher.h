@@ -34,7 +34,7 @@ struct LineMatcherParams
 
   LineMatcherParams();
 
-  /** All faults, one a line; empty when the parameters are usable. */
+  /** Each fault in one line, those of nested parameters included; empty when the parameters are usable. */
   std::vector<std::string> validate() const;
 };
 

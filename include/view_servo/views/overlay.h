@@ -30,10 +30,10 @@ struct FollowedView
 {
   cv::Rect region;    ///< of the stored view [px]
   Eigen::Matrix3d h;  ///< x_cur ~ H x_ref; NaN: not found
-  Points found;       ///< points of the stored view that were found [px]
-  Points missing;     ///< those that were not [px]
-  Points path;        ///< where its chosen point has been, in current pixels, newest last
-  std::string text;   ///< one line
+  Points found;    ///< points of the stored view that were found, at their places there [px]; drawn where h sends them
+  Points missing;  ///< those that were not found, likewise
+  Points path;     ///< where the view's chosen point has been, in current pixels, newest last
+  std::string text;  ///< one line
 };
 
 /**

@@ -46,7 +46,8 @@ struct PointViewMatcherParams
   bool guided = true;  ///< look for more matches along the geometry found
   GuidedParams guidance;
   /**
-   * The first attempt searches for this part of the profiles; unless its geometry is beyond doubt, all follow. (0, 1]
+   * Share of the current image's profiles that vote in the first attempt, (0, 1]. Unless the geometry that they give
+   * is far more significant than min_log_significance asks for, a second attempt uses all of them.
    */
   double first_share = 0.6;
   bool scale_search = true;  ///< try other scale ratios and coarser scales when the full images give no geometry
@@ -57,7 +58,7 @@ struct PointViewMatcherParams
   double min_log_parallax = 3.0;      ///< least Parallax::significance() of a fundamental matrix, off its best plane
   std::uint64_t seed = 1;             ///< fixes all random draws
 
-  /** All faults, one a line; empty when the parameters are usable. */
+  /** Each fault in one line, those of nested parameters included; empty when the parameters are usable. */
   std::vector<std::string> validate() const;
 };
 

@@ -64,6 +64,7 @@ public:
   {
     return grey_;
   }
+  /** As given to the constructor; empty: everywhere. */
   const cv::Rect& region() const
   {
     return region_;
@@ -109,7 +110,10 @@ private:
   mutable std::unique_ptr<LineFeatures> lines_;
 };
 
-/** For the message of a failure: which of the two regions can hardly show anything, see lackOfLight(); or "". */
-std::string noteOfLight(const PreparedImage& reference, const PreparedImage& current);
+/**
+ * To be appended to the message of a failure: which image's region is nearly black, white or uniform, see
+ * lackOfLight(); empty when neither is.
+ */
+std::string exposureNote(const PreparedImage& reference, const PreparedImage& current);
 
 }  // namespace view_servo

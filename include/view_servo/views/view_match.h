@@ -89,7 +89,7 @@ struct ViewMatch
    * @{ */
   std::vector<MatchedLine> lines;       ///< best first
   std::vector<Eigen::Matrix3d> planes;  ///< homographies x_cur ~ H x_ref of planes, most lines first
-  /** x_curᵀ F x_ref = 0, whatever the model asked for; NaN when it cannot be estimated. */
+  /** F of norm 1 [px], x_curᵀ F x_ref = 0, whichever GeometryModel was asked for; NaN when it cannot be estimated. */
   Eigen::Matrix3d fundamental = Eigen::Matrix3d::Constant(std::numeric_limits<double>::quiet_NaN());
   /** @} */
 };

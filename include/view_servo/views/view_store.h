@@ -73,8 +73,10 @@ public:
   }
 
   /**
-   * @return what failed after the view was in place, in one line; empty: nothing.
-   * @throws ViewStoreError for a bad name, image or region, for a name in use unless `overwrite`, and on a full disk.
+   * Saves a view.
+   * @return a warning in one line when a step failed after the view had been saved; else empty.
+   * @throws ViewStoreError when it was not saved: for a bad name, image or region, for a name in use unless
+   * `overwrite`, or when writing fails, as on a full disk.
    */
   std::string save(const StoredView& view, bool overwrite) const;
 
