@@ -14,7 +14,7 @@ struct Repetition
   const char* what;    ///< is repeated, in the plural; empty when there are random numbers, but nothing is repeated
   int runs;            ///< how often, unless told otherwise; 0 when nothing is repeated
   int brief_runs;      ///< the same for the brief form
-  std::uint64_t seed;  ///< that the tables of docs/results.md were made with
+  std::uint64_t seed;  ///< that the tables of docs/results/ were made with
 };
 
 /** What an experiment is given. */
@@ -22,7 +22,7 @@ struct ExperimentContext
 {
   std::filesystem::path data;  ///< real images, for experiments that need them
   bool brief = false;          ///< do a small part only
-  int threads = 0;             ///< use at most so many; 0: as many as there are processors
+  int threads = 0;             ///< use at most this many; 0: as many as there are processors
   int runs = 0;                ///< how often to repeat what is repeated; 0: as often as the experiment does by itself
   std::optional<std::uint64_t> seed;  ///< from which all random numbers are drawn; empty: that of the experiment
 

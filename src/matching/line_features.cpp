@@ -90,8 +90,13 @@ LineFeatures::LineFeatures(const cv::Mat& grey, Segments segments, const LineFea
     directions_.push_back(segments_.back().direction());
   }
 
-  const int n = static_cast<int>(segments_.size());
   fillDirectionBins();
+  findNeighbours();
+}
+
+void LineFeatures::findNeighbours()
+{
+  const int n = static_cast<int>(segments_.size());
   const std::size_t count = static_cast<std::size_t>(std::min(n, params_.max_grouped));
   near_.resize(count);
   meetings_.resize(count);

@@ -44,7 +44,7 @@ public:
   };
 
   static constexpr const char* TOPIC = "line_matches";
-  static constexpr double RATE = 10.0;  // [Hz]
+  static constexpr double RATE = LINES_RATE;
 
   explicit LineMatching(const Params& params) : matcher_(params)
   {
@@ -99,7 +99,7 @@ private:
  * each camera image with that stored view.
  *
  * Parameters, all private; config/line_matcher.yaml has them with their ranges:
- *  - `~view`, `~rate` (default 10.0 [Hz]), `~views_dir`, `~allow_paths`, `~image_patience`, `~image_transport`, `~queue_size`,
+ *  - `~view`, `~rate`, `~views_dir`, `~allow_paths`, `~image_patience`, `~image_transport`, `~queue_size`,
  *    `~max_image_age`: see StreamingMatcher;
  *  - those of the matcher, see parameters(LineMatcherParams&).
  *

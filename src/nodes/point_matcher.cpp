@@ -45,7 +45,7 @@ public:
   };
 
   static constexpr const char* TOPIC = "point_matches";
-  static constexpr double RATE = 5.0;  // [Hz]
+  static constexpr double RATE = POINTS_RATE;
 
   explicit PointMatching(const Params& params) : matcher_(params)
   {
@@ -112,7 +112,7 @@ private:
  * each camera image with that stored view.
  *
  * Parameters, all private; config/point_matcher.yaml has them with their ranges:
- *  - `~view`, `~rate` (default 5.0 [Hz]), `~views_dir`, `~allow_paths`, `~image_patience`, `~image_transport`, `~queue_size`,
+ *  - `~view`, `~rate`, `~views_dir`, `~allow_paths`, `~image_patience`, `~image_transport`, `~queue_size`,
  *    `~max_image_age`: see StreamingMatcher;
  *  - those of the matcher, see parameters(PointViewMatcherParams&).
  *

@@ -139,7 +139,7 @@ public:
   };
 
   static constexpr const char* TOPIC = "scene_matches";
-  static constexpr double RATE = 2.0;  // [Hz]
+  static constexpr double RATE = SCENE_RATE;
 
   explicit SceneMatching(const Params& params) : matcher_(params)
   {
@@ -205,7 +205,7 @@ private:
  * the answer has the motion between the cameras, up to the distance.
  *
  * Parameters, all private; config/scene_matcher.yaml has them with their ranges:
- *  - `~view`, `~rate` (default 2.0 [Hz]), `~views_dir`, `~allow_paths`, `~image_patience`, `~image_transport`, `~queue_size`,
+ *  - `~view`, `~rate`, `~views_dir`, `~allow_paths`, `~image_patience`, `~image_transport`, `~queue_size`,
  *    `~max_image_age`: see StreamingMatcher;
  *  - those of the matcher, see parameters(SceneMatcherParams&).
  *

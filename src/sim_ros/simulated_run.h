@@ -358,13 +358,9 @@ inline void endWithRoslaunch()
 }
 
 /**
- * main() of a program that runs a simulated robot once. Parameters, all private:
- *  - `~world`, `~start` (string), `~timeout` (double [s], > 0), with the program's defaults;
- *  - `~view` (string, default "demo"): the name that the view is stored by;
- *  - `~patience` (double, default START_PATIENCE [s], > 0): longest wait for other nodes to be there and to answer;
- *  - `~result` (string, default ""): file that the outcome is written to, 0 or 1 and a line;
- *  - `~exit` (bool, default true): end afterwards, with status 0 when the robot is at the view and 1 when not, and let
- *    roslaunch end, too, when that has started the program.
+ * main() of a program that runs a simulated robot once. Its parameters, all private, are in the table below. With `~exit`
+ * it ends afterwards, with status 0 when the robot is at the view and 1 when not, and roslaunch ends, too, when that has
+ * started the program.
  *
  * @param name of the node.
  * @param what is run, for the line that is printed.

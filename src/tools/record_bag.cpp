@@ -98,7 +98,7 @@ void writeImage(BagWriter& bag, const cv::Mat& image, const sensor_msgs::CameraI
   bag.write(IMAGE_TOPIC, info.header.stamp, toImage(image, sensor_msgs::image_encodings::MONO8, info.header));
 }
 
-ros::Duration seconds(double value)
+ros::Duration toDuration(double value)
 {
   ros::Duration duration;
   duration.fromNSec(std::llround(1e9 * value));
@@ -107,7 +107,7 @@ ros::Duration seconds(double value)
 
 ros::Time startOf(const Options& options)
 {
-  return ros::Time() + seconds(options.start_time);
+  return ros::Time() + toDuration(options.start_time);
 }
 
 // ------------------------------------------------------------------------------------------------ simulated robots
@@ -268,7 +268,7 @@ void recordSimulation(const std::string& world_name, const std::string& trajecto
   const int last_step = static_cast<int>(std::lround(duration / DT));
   for (int step = 0; step <= last_step; ++step)
   {
-    const ros::Time stamp = start + seconds(step * DT);
+    const ros::Time stamp = start + toDuration(step * DT);
     const Eigen::Isometry3d camera_pose = robot->cameraPose();
     const bool image_due = isDue(step, options.rate);
     const bool sensors_due = isDue(step, options.odometry_rate);
@@ -386,7 +386,7 @@ void recordImages(const std::string& file, const Options& options)
     }
     camera.width = image.cols;
     camera.height = image.rows;
-    header.stamp = startOf(options) + seconds(static_cast<double>(i) / options.rate);
+    header.stamp = startOf(options) + toDuration(static_cast<double>(i) / options.rate);
     bag.write(GROUND_TRUTH_TOPIC, header.stamp, sim::toGroundTruth(images[i].pose, header.stamp));
     writeImage(bag, image, view_servo::toCameraInfo(camera, header));
   }

@@ -13,7 +13,7 @@ namespace view_servo
 {
 std::vector<Parameter> parameters(PlaneTrackerParams& params)
 {
-  return joined({ parameters(params.tracker),
+  return joined({ parameters(params.aligner),
                   parameters(params.filter),
                   {
                       integer("lost_after", params.lost_after, "", ">= 1",
@@ -28,7 +28,7 @@ std::vector<std::string> PlaneTrackerParams::validate() const
 
 PlaneTracker::PlaneTracker(const cv::Mat& reference, const cv::Rect& region, const Eigen::Matrix3d& k,
                            const PlaneTrackerParams& params)
-  : params_(params), k_(k), tracker_(reference, region, params.tracker), filter_(params.filter)
+  : params_(params), k_(k), aligner_(reference, region, params.aligner), filter_(params.filter)
 {
   requireNoFaults("parameters of the plane tracker", params.validate());
 }
@@ -63,11 +63,11 @@ const PlaneTrack& PlaneTracker::add(const cv::Mat& image, const std::optional<Ei
   {
     return track_;
   }
-  track_.homography = tracker_.track(image, predict(camera_in_odom));
+  track_.homography = aligner_.track(image, predict(camera_in_odom));
   if (!track_.homography.found)
   {
     // Odometry may be wrong.
-    track_.homography = tracker_.track(image, last_->h);
+    track_.homography = aligner_.track(image, last_->h);
   }
   if (!track_.homography.found)
   {

@@ -46,8 +46,8 @@ public:
 
   Tables()
   {
-    lines_node.rate = 10.0;
-    scene_node.rate = 2.0;
+    lines_node.rate = LINES_RATE;
+    scene_node.rate = SCENE_RATE;
   }
 
   /** Titles and tables of a file in config/. */

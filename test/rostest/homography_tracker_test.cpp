@@ -108,7 +108,7 @@ Eigen::Matrix3d placed(double scale, double u, double v)
   return h;
 }
 
-class HomographyAlignerTest : public ::testing::Test
+class HomographyTrackerTest : public ::testing::Test
 {
 protected:
   static void SetUpTestSuite()
@@ -255,7 +255,7 @@ protected:
   const ros::Publisher wanted_ = ros::NodeHandle().advertise<WantedView>("wanted_view", 1, true);
 };
 
-TEST_F(HomographyAlignerTest, FollowsAView)
+TEST_F(HomographyTrackerTest, FollowsAView)
 {
   follow(exampleHomography());
   const Homography found = *homographies_.last();
@@ -280,7 +280,7 @@ TEST_F(HomographyAlignerTest, FollowsAView)
   }
 }
 
-TEST_F(HomographyAlignerTest, DrawsWhatItFollows)
+TEST_F(HomographyTrackerTest, DrawsWhatItFollows)
 {
   const Recorder<sensor_msgs::Image> overlay("homography_tracker/overlay");
   follow(exampleHomography());
@@ -289,7 +289,7 @@ TEST_F(HomographyAlignerTest, DrawsWhatItFollows)
   EXPECT_EQ(overlay.last()->width, 480u);
 }
 
-TEST_F(HomographyAlignerTest, StopsWhenTold)
+TEST_F(HomographyTrackerTest, StopsWhenTold)
 {
   follow(exampleHomography());
   std_srvs::Trigger service;
@@ -301,7 +301,7 @@ TEST_F(HomographyAlignerTest, StopsWhenTold)
   EXPECT_LT(homographies_.last()->header.stamp, then);
 }
 
-TEST_F(HomographyAlignerTest, RefusesWhatItCannotFollowAndGoesOnWithWhatItFollowed)
+TEST_F(HomographyTrackerTest, RefusesWhatItCannotFollowAndGoesOnWithWhatItFollowed)
 {
   follow(exampleHomography());
   const auto refused = [](const SetView::Response& response, const std::string& words) {
@@ -325,7 +325,7 @@ TEST_F(HomographyAlignerTest, RefusesWhatItCannotFollowAndGoesOnWithWhatItFollow
   expectTracking(exampleHomography());
 }
 
-TEST_F(HomographyAlignerTest, FindsTheViewAgainAfterAnOcclusion)
+TEST_F(HomographyTrackerTest, FindsTheViewAgainAfterAnOcclusion)
 {
   follow(exampleHomography());
   const cv::Mat image = warped(picture(), exampleHomography());
@@ -343,7 +343,7 @@ TEST_F(HomographyAlignerTest, FindsTheViewAgainAfterAnOcclusion)
   expectTracking(exampleHomography());
 }
 
-TEST_F(HomographyAlignerTest, FindsTheViewAnewSomewhereElse)
+TEST_F(HomographyTrackerTest, FindsTheViewAnewSomewhereElse)
 {
   follow(exampleHomography());
   const ros::Time seen = camera_.show(blank());
@@ -353,7 +353,7 @@ TEST_F(HomographyAlignerTest, FindsTheViewAnewSomewhereElse)
   expectTracking(elsewhere);
 }
 
-TEST_F(HomographyAlignerTest, DoesNotFollowAViewThatIsSeenTwice)
+TEST_F(HomographyTrackerTest, DoesNotFollowAViewThatIsSeenTwice)
 {
   const Eigen::Matrix3d left = placed(0.48, 4.0, 90.0);
   const Eigen::Matrix3d right = placed(0.48, 246.0, 90.0);
@@ -373,7 +373,7 @@ TEST_F(HomographyAlignerTest, DoesNotFollowAViewThatIsSeenTwice)
   expectTracking(left);
 }
 
-TEST_F(HomographyAlignerTest, LooksAnewWhenTimeGoesBack)
+TEST_F(HomographyTrackerTest, LooksAnewWhenTimeGoesBack)
 {
   follow(exampleHomography());
   camera_.set(true, 3.0);
@@ -382,7 +382,7 @@ TEST_F(HomographyAlignerTest, LooksAnewWhenTimeGoesBack)
   expectTracking(exampleHomography());
 }
 
-TEST_F(HomographyAlignerTest, FollowsTheViewThatADriverWants)
+TEST_F(HomographyTrackerTest, FollowsTheViewThatADriverWants)
 {
   camera_.show(warped(picture(), exampleHomography()));
   for (const std::string goal : { "goal 1", "goal 2" })
@@ -402,7 +402,7 @@ TEST_F(HomographyAlignerTest, FollowsTheViewThatADriverWants)
   EXPECT_TRUE(waitForAnswer(homographies_, "", [](const Homography& message) { return message.valid != 0; }));
 }
 
-TEST_F(HomographyAlignerTest, NoneFromADriverLeavesAPersonsViewAlone)
+TEST_F(HomographyTrackerTest, NoneFromADriverLeavesAPersonsViewAlone)
 {
   follow(exampleHomography());
   want("", "an old goal");
@@ -412,7 +412,7 @@ TEST_F(HomographyAlignerTest, NoneFromADriverLeavesAPersonsViewAlone)
   EXPECT_EQ(homographies_.last()->view, "goal");
 }
 
-TEST_F(HomographyAlignerTest, RefusesWhatADriverCannotHave)
+TEST_F(HomographyTrackerTest, RefusesWhatADriverCannotHave)
 {
   expectRefusal("unknown", "1", "unknown");
   expectRefusal("../goal", "2", "../goal");
@@ -429,7 +429,7 @@ TEST_F(HomographyAlignerTest, RefusesWhatADriverCannotHave)
   EXPECT_EQ(homographies_.last()->goal, "6");
 }
 
-TEST_F(HomographyAlignerTest, FollowsAViewOfAnotherCamera)
+TEST_F(HomographyTrackerTest, FollowsAViewOfAnotherCamera)
 {
   const Camera here = toCamera(FakeCamera("none").infoOf(picture(), ros::Time()));
   Camera there;
@@ -451,7 +451,7 @@ TEST_F(HomographyAlignerTest, FollowsAViewOfAnotherCamera)
   expectTracking(exampleHomography());
 }
 
-TEST_F(HomographyAlignerTest, SaysWhatIsLackingUntilItIsThere)
+TEST_F(HomographyTrackerTest, SaysWhatIsLackingUntilItIsThere)
 {
   const auto waits = [](const std::string& words) {
     return [words](const Homography& message) {
@@ -481,7 +481,7 @@ TEST_F(HomographyAlignerTest, SaysWhatIsLackingUntilItIsThere)
   EXPECT_TRUE(waitForAnswer(homographies_, "early", waits("no image comes on '/camera/image_raw'")));
 }
 
-TEST_F(HomographyAlignerTest, RefusesImagesOfAnotherCalibrationUntilItIsChosenAnew)
+TEST_F(HomographyTrackerTest, RefusesImagesOfAnotherCalibrationUntilItIsChosenAnew)
 {
   camera_.show(picture());
   want("goal", "before");
@@ -496,7 +496,7 @@ TEST_F(HomographyAlignerTest, RefusesImagesOfAnotherCalibrationUntilItIsChosenAn
   EXPECT_TRUE(waitForAnswer(homographies_, "", [](const Homography& message) { return message.valid != 0; }));
 }
 
-TEST_F(HomographyAlignerTest, OutlivesWhatACameraShouldNotSend)
+TEST_F(HomographyTrackerTest, OutlivesWhatACameraShouldNotSend)
 {
   const FakeCamera camera("camera");
   ASSERT_TRUE(camera.waitForSubscribers(2));
@@ -531,7 +531,7 @@ TEST_F(HomographyAlignerTest, OutlivesWhatACameraShouldNotSend)
 }
 
 /** Nodes that the test starts itself. */
-class TrackerProcessTest : public HomographyAlignerTest
+class TrackerProcessTest : public HomographyTrackerTest
 {
 protected:
   std::vector<std::string> command(const std::string& name, const std::vector<std::string>& more = {}) const

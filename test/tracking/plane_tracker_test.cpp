@@ -119,7 +119,7 @@ TEST(PlaneTrackerParams, NameAllFaultsAtOnce)
 {
   PlaneTrackerParams params;
   EXPECT_TRUE(params.validate().empty());
-  params.tracker.levels = 0;
+  params.aligner.levels = 0;
   params.filter.window = -1.0;
   params.lost_after = 0;
   EXPECT_EQ(params.validate().size(), 3U);

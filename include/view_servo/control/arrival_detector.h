@@ -24,7 +24,8 @@ double gradientSimilarity(const cv::Mat& reference, const cv::Mat& current);
 /** Options of the arrival detector. */
 struct ArrivalDetectorParams
 {
-  double rise = 1.0;  ///< a rise of the similarity counts as sudden above so many standard deviations of those before
+  double rise =
+      1.0;  ///< a rise counts as sudden when it exceeds this many standard deviations of the similarities before it
   double min_rise = 0.08;  ///< a smaller rise never counts as sudden, however small that standard deviation is
   double drop = 0.1;       ///< the view has been passed when the similarity has lost this part of its rise again
   int min_history = 5;     ///< similarities that must be known before a rise counts

@@ -29,7 +29,7 @@ public:
    */
   std::optional<double> estimate() const;
 
-  static constexpr double LARGEST = 0.6;  ///< [s]
+  static constexpr double LARGEST = 0.6;  ///< largest offset that is looked for [s]
   static constexpr std::size_t FEWEST_IMAGES = 15;
 
 private:

@@ -41,9 +41,9 @@ std::vector<Parameter> parameters(Servo25dParams& params);
 /** The point that servoing brings to its place, and the camera that sees it. */
 struct ServoTarget
 {
-  Eigen::Matrix3d k;      ///< camera matrix, without distortion [px]
-  Eigen::Vector2d size;   ///< width and height of the images [px]
-  Eigen::Vector2d point;  ///< the chosen point in the stored view, on the plane [px]
+  Eigen::Matrix3d k = Eigen::Matrix3d::Identity();  ///< camera matrix, without distortion [px]
+  Eigen::Vector2d size = Eigen::Vector2d::Zero();   ///< width and height of the images [px]
+  Eigen::Vector2d point = Eigen::Vector2d::Zero();  ///< the chosen point in the stored view, on the plane [px]
 };
 
 /** What an image shows of the plane. */
@@ -58,9 +58,10 @@ struct PlaneView
 /** The error of 2.5D servoing (Malis, Chaumette & Boudet 1999). */
 struct Servo25dError
 {
-  Eigen::Vector2d point;     ///< (x - x*, y - y*) of the chosen point, in normalised coordinates
-  double depth = 0.0;        ///< log(Z / Z*) of the chosen point: its depth now over that in the stored view
-  Eigen::Vector3d rotation;  ///< θu, axis times angle: by it the camera is turned from where the view was stored [rad]
+  Eigen::Vector2d point = Eigen::Vector2d::Zero();  ///< (x - x*, y - y*) of the chosen point, in normalised coordinates
+  double depth = 0.0;  ///< log(Z / Z*) of the chosen point: its depth now over that in the stored view
+  Eigen::Vector3d rotation = Eigen::Vector3d::
+      Zero();  ///< θu, axis times angle: by it the camera is turned from where the view was stored [rad]
 };
 
 /** @param point the chosen point (x*, y*) of the stored view, in normalised coordinates. */

@@ -25,7 +25,7 @@ bool lsdAvailable();
 struct LineSegmentParams
 {
   SegmentDetector detector = SegmentDetector::CANNY;
-  double sigma = 1.0;              ///< scale of the edges [px], [0.6, 20]: about 1 for fine, 2 for coarse ones
+  double sigma = 1.0;              ///< scale of the edges [px]: about 1 for fine, 2 for coarse ones
   double low_threshold = 2.0;      ///< CANNY: see EdgeParams [grey levels/px]
   double high_threshold = 4.0;     ///< CANNY: see EdgeParams [grey levels/px]
   double min_deviation = 0.6;      ///< CANNY: smaller deviations from a straight line are noise [px]

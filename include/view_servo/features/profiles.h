@@ -23,7 +23,7 @@ enum class PairSelection
 struct ProfileParams
 {
   PairSelection selection = PairSelection::NEAREST;  ///< which corners are paired
-  int neighbours = 50;        ///< K_c: with so many of its nearest corners each one is paired (NEAREST)
+  int neighbours = 50;        ///< K_c: each corner is paired with this many of its nearest ones (NEAREST)
   double max_length = 200.0;  ///< D_c: longest profile (RADIUS) [px]
   double min_length = 10.0;   ///< shortest profile [px]
   int coefficients = 8;       ///< N_f: number of Fourier features of a profile: 4, 6 or 8

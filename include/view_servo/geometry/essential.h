@@ -17,8 +17,8 @@ namespace view_servo
 /** Motion between two calibrated cameras: X_cur = R X_ref + t, the length of t unknown. */
 struct RelativePose
 {
-  Eigen::Matrix3d rotation;
-  Eigen::Vector3d translation;  ///< of length 1
+  Eigen::Matrix3d rotation = Eigen::Matrix3d::Identity();
+  Eigen::Vector3d translation = Eigen::Vector3d::UnitZ();  ///< of length 1
 
   /** x_curᵀ E x_ref = 0, E = [t]x R. */
   Eigen::Matrix3d essential() const;

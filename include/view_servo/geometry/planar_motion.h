@@ -48,8 +48,8 @@ InverseDepth inverseDepth(const Correspondence& pair, const Eigen::Matrix3d& rot
 /** A point of the reference view with its depth. */
 struct Landmark
 {
-  Eigen::Vector2d reference;  ///< level point
-  double inverse_depth;       ///< 1 / z in the reference camera, z in the unit of the poses used with it
+  Eigen::Vector2d reference = Eigen::Vector2d::Zero();  ///< level point
+  double inverse_depth = 0.0;  ///< 1 / z in the reference camera, z in the unit of the poses used with it
 };
 
 /** The level point at which the current camera sees a landmark; NaN unless the landmark is in front of the camera. */
@@ -59,7 +59,7 @@ Eigen::Vector2d project(const Landmark& landmark, const PlanarPose& reference_in
 struct Sighting
 {
   Landmark landmark;
-  Eigen::Vector2d current;  ///< level point
+  Eigen::Vector2d current = Eigen::Vector2d::Zero();  ///< level point
 };
 
 /**

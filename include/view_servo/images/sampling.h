@@ -48,7 +48,7 @@ public:
     return above + fv * (below - above);
   }
 
-  /** at() at `count` places, first + i step; `values` has to hold so many. */
+  /** at() at `count` places, first + i step; `values` has room for `count` numbers. */
   void alongLine(const Eigen::Vector2f& first, const Eigen::Vector2f& step, int count, float* values) const;
   /**
    * The same for places in homogeneous coordinates, as on a line that a homography maps into this image. Their third

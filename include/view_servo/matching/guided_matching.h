@@ -30,9 +30,9 @@ std::vector<Parameter> parameters(GuidedParams& params);
 /** A reference corner found again in the current image. */
 struct GuidedMatch
 {
-  int reference;            ///< index of the corner
-  Eigen::Vector2d current;  ///< sub-pixel position [px]
-  double correlation;       ///< of the patches, in [min_correlation, 1]
+  int reference = 0;                                  ///< index of the corner
+  Eigen::Vector2d current = Eigen::Vector2d::Zero();  ///< sub-pixel position [px]
+  double correlation = 0.0;                           ///< of the patches, in [min_correlation, 1]
 };
 
 /**

@@ -22,9 +22,9 @@ namespace view_servo
 struct LineFeatureParams
 {
   LineGroupParams groups;
-  int max_grouped = 400;     ///< only so many segments, the longest, form groups and start regions
+  int max_grouped = 400;     ///< at most this many segments, the longest, form groups and start regions
   int neighbours = 40;       ///< nearest segments kept for each, see near(): regions of matches begin among them
-  int neighbour_pairs = 15;  ///< at most so many of these, whose lines meet its own, are kept, see meetings()
+  int neighbour_pairs = 15;  ///< at most this many of these, whose lines meet its own, are kept, see meetings()
 
   /** Each fault in one line, those of nested parameters included; empty when the parameters are usable. */
   std::vector<std::string> validate() const;
@@ -46,8 +46,8 @@ public:
   /** A segment whose line meets that of another. */
   struct Meeting
   {
-    int other;           ///< index of the other segment
-    Eigen::Vector2d at;  ///< intersection of the two lines [px]
+    int other = 0;                                 ///< index of the other segment
+    Eigen::Vector2d at = Eigen::Vector2d::Zero();  ///< intersection of the two lines [px]
   };
 
   static constexpr double MIN_SINE = 0.198669331;  ///< of the least angle between lines that count as meeting, 0.2 rad
@@ -121,6 +121,8 @@ private:
 
   static int directionBin(const Eigen::Vector2d& direction);
   void fillDirectionBins();
+  /** Sets near_ and meetings_. */
+  void findNeighbours();
 
   struct Groups
   {

@@ -54,9 +54,9 @@ struct SegmentMatch
 /** Matches of neighbouring segments that agree with one homography. */
 struct LineRegion
 {
-  Eigen::Matrix3d h;  ///< homography x_cur ~ H x_ref [px]
+  Eigen::Matrix3d h = Eigen::Matrix3d::Identity();  ///< homography x_cur ~ H x_ref [px]
   std::vector<SegmentMatch> matches;
-  double support;  ///< sum over the matches of (0.3 + 0.7 share) x correlation
+  double support = 0.0;  ///< sum over the matches of (0.3 + 0.7 share) x correlation
 };
 
 /**

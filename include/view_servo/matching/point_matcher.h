@@ -32,7 +32,7 @@ struct PointMatcherParams
   AssignmentMethod assignment = AssignmentMethod::EXACT;
   bool cyclic_order = true;      ///< weigh associations by cyclic alignment of the profiles that voted (ch. 7)
   double min_correlation = 0.7;  ///< least correlation of profiles that are aligned (7.3)
-  /** Entries that are aligned: so many of each row and of each column, those of most votes; 0 = all. */
+  /** At most this many entries of each row and of each column are aligned, those of most votes; 0 = all. */
   int cyclic_entries = 5;
 
   /** Each fault in one line, those of nested parameters included; empty when the parameters are usable. */

@@ -16,8 +16,8 @@ public:
   /** A homography with its inverse, so that scoring many points inverts once. */
   struct Model
   {
-    Eigen::Matrix3d h;
-    Eigen::Matrix3d h_inverse;
+    Eigen::Matrix3d h = Eigen::Matrix3d::Identity();
+    Eigen::Matrix3d h_inverse = Eigen::Matrix3d::Identity();
   };
   static constexpr int SAMPLE_SIZE = 4;
 

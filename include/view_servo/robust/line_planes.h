@@ -23,7 +23,7 @@ struct LinePlaneParams
 {
   double threshold = 2.0;  ///< largest distance of a plane's lines, across, in either image [px]
   int min_lines = 8;       ///< least number of lines that make a plane
-  int max_planes = 4;      ///< at most so many planes are looked for
+  int max_planes = 4;      ///< at most this many planes are looked for
 
   /** Each fault in one line, those of nested parameters included; empty when the parameters are usable. */
   std::vector<std::string> validate() const;

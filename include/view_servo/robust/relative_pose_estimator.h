@@ -20,7 +20,7 @@ public:
   struct Model
   {
     RelativePose pose;
-    Eigen::Matrix3d essential;  ///< pose.essential(): x_curᵀ E x_ref = 0
+    Eigen::Matrix3d essential = Eigen::Matrix3d::Zero();  ///< pose.essential(): x_curᵀ E x_ref = 0
   };
   static constexpr int SAMPLE_SIZE = 5;
 

@@ -15,7 +15,7 @@ double logSignificance(std::size_t candidates, std::size_t inliers, int sample_s
 
 /**
  * log10 of (a bound, Chernoff's, on) the probability that of `count` events, each with `probability`, `successes` or more
- * happen; 0 when so many are expected anyway. With events of different probabilities their mean may be given.
+ * happen; 0 when that many are expected anyway. With events of different probabilities their mean may be given.
  */
 double logBinomialTail(std::size_t count, std::size_t successes, double probability);
 

@@ -30,8 +30,8 @@ struct CameraTopics
 /** How many messages came on a camera's topics. */
 struct CameraTraffic
 {
-  int images = 0;
-  int infos = 0;
+  int images = 0;         ///< messages on the topic of images
+  int infos = 0;          ///< messages on the topic of camera_info
   int pairs = 0;          ///< of an image and a camera_info with the same stamp
   double duration = 0.0;  ///< of the time in which they came [s]
 };

@@ -66,11 +66,8 @@ struct ImageSourceParams
 std::vector<Parameter> parameters(ImageSourceParams& params);
 
 /**
- * Turns the ImageSource of a request into an image. Parameters:
- *  - `~allow_paths` (bool, default true): whether requests may name files. They are read with the node's rights, so
- *    turn it off where requests come from strangers;
- *  - `~image_patience` (double, default 5.0 [s], >= 0): longest wait for an image of the camera when a request wants
- *    one and none has come yet.
+ * Turns the ImageSource of a request into an image. Parameters: see parameters(ImageSourceParams&). Where `~allow_paths`
+ * is on, requests may name files, which are read with the node's rights: turn it off where requests come from strangers.
  */
 class ImageSourceReader
 {

@@ -36,12 +36,8 @@ std::vector<Parameter> parameters(SessionStarterParams& params);
 
 /**
  * Makes a PlaneSession for a view once everything is there that it needs: the stored view, images with a calibration,
- * and tf. Safe to use from several threads. Parameters:
- *  - `~views_dir` (string, default "" = $ROS_HOME/view_servo/views): where stored views are;
- *  - `~odom_frame` (string, default "base_link"): frame that does not jump, in which tf knows the camera's frame; "":
- *    none;
- *  - `~tf_patience` (double, default 0.05 [s], >= 0): longest wait of an image for tf;
- *  - those of tracking, see PlaneTrackerParams.
+ * and tf. Safe to use from several threads. Its parameters are `~views_dir`, `~odom_frame`, `~tf_patience` and those of tracking, see
+ * parameters(HomographyTrackerNodeParams&).
  */
 class SessionStarter
 {

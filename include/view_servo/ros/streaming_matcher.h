@@ -42,13 +42,20 @@
 
 namespace view_servo
 {
+/** @name Default rates of matching camera images [Hz], which a machine of two cores reaches while other nodes run, too.
+ * @{ */
+constexpr double POINTS_RATE = 5.0;
+constexpr double LINES_RATE = 10.0;
+constexpr double SCENE_RATE = 2.0;
+/** @} */
+
 /** Parameters of a StreamingMatcher besides those of its way of matching. */
 struct StreamingMatcherParams
 {
   CameraInputParams camera;
   ImageSourceParams sources;
-  std::string view;   ///< stored view that camera images are matched with; empty: none
-  double rate = 5.0;  ///< camera images are matched at most this often [Hz]
+  std::string view;           ///< stored view that camera images are matched with; empty: none
+  double rate = POINTS_RATE;  ///< camera images are matched at most this often [Hz]
 
   /** Each fault in one line, those of nested parameters included; empty when the parameters are usable. */
   std::vector<std::string> validate() const;
@@ -76,8 +83,7 @@ struct MatchLabel
 /**
  * A node that matches images: two given ones on request, and, when a view is chosen, each camera image with that stored
  * view. Parameters, all private:
- *  - `~view` (string, default ""): stored view that camera images are matched with; "" = none;
- *  - `~rate` (double, default Matching::RATE [Hz], >= 0.001): camera images are matched at most this often;
+ *  - `~view`, `~rate`: see parameters(StreamingMatcherParams&); by default the rate is Matching::RATE;
  *  - `~views_dir`, `~allow_paths`: see ImageSourceReader;
  *  - `~image_transport`, `~queue_size`, `~max_image_age`: see CameraInput;
  *  - those of Matching.

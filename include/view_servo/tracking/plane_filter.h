@@ -20,8 +20,8 @@ namespace view_servo
 struct PlaneFilterParams
 {
   /**
-   * How far the camera may be from where it is now at measurements that are averaged, and how far apart two
-   * measurements have to be for d to be known [m].
+   * Measurements are averaged whose camera was within this distance of the present one; d is known once two of them are
+   * this far apart [m].
    */
   double window = 0.1;
   int max_measurements = 60;  ///< largest number of measurements that are averaged

@@ -20,7 +20,7 @@ namespace view_servo
 /** Options of following a plane from image to image. */
 struct PlaneTrackerParams
 {
-  HomographyAlignerParams tracker;
+  HomographyAlignerParams aligner;
   PlaneFilterParams filter;
   int lost_after = 5;  ///< the plane is lost after this many images in a row without it
 
@@ -89,7 +89,7 @@ public:
   /** The corners of the stored view that are tracked [px]. */
   const std::vector<Eigen::Vector2d>& points() const
   {
-    return tracker_.points();
+    return aligner_.points();
   }
 
 private:
@@ -104,7 +104,7 @@ private:
 
   PlaneTrackerParams params_;
   Eigen::Matrix3d k_;
-  HomographyAligner tracker_;
+  HomographyAligner aligner_;
   PlaneFilter filter_;
   std::optional<Place> last_;
   bool found_once_ = false;

@@ -10,6 +10,7 @@
 #include <opencv2/core/mat.hpp>
 #include <opencv2/core/types.hpp>
 
+#include <limits>
 #include <string>
 
 namespace view_servo
@@ -28,8 +29,9 @@ cv::Mat drawOverlay(const PreparedImage& reference, const PreparedImage& current
 /** A stored view that is tracked, for drawFollowedView(). */
 struct FollowedView
 {
-  cv::Rect region;    ///< of the stored view [px]
-  Eigen::Matrix3d h;  ///< x_cur ~ H x_ref; NaN: not found
+  cv::Rect region;  ///< of the stored view [px]
+  /** x_cur ~ H x_ref; NaN: not found. */
+  Eigen::Matrix3d h = Eigen::Matrix3d::Constant(std::numeric_limits<double>::quiet_NaN());
   Points found;    ///< points of the stored view that were found, at their places there [px]; drawn where h sends them
   Points missing;  ///< those that were not found, likewise
   Points path;     ///< where the view's chosen point has been, in current pixels, newest last

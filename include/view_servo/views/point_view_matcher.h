@@ -46,7 +46,7 @@ struct PointViewMatcherParams
   bool guided = true;  ///< look for more matches along the geometry found
   GuidedParams guidance;
   /**
-   * Share of the current image's profiles that vote in the first attempt, (0, 1]. Unless the geometry that they give
+   * Share of the current image's profiles that vote in the first attempt. Unless the geometry that they give
    * is far more significant than min_log_significance asks for, a second attempt uses all of them.
    */
   double first_share = 0.6;

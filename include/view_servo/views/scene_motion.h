@@ -18,7 +18,7 @@ struct SceneMotion
 {
   RelativePose pose;  ///< X_cur = R X_ref + t, the length of t unknown
   /** See covarianceOf(). Matches that lie near each other err alike, which is allowed for. */
-  Eigen::Matrix<double, 6, 6> covariance;
+  Eigen::Matrix<double, 6, 6> covariance = Eigen::Matrix<double, 6, 6>::Zero();
   std::size_t inliers = 0;  ///< matches that agree with the motion
 };
 

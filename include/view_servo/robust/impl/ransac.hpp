@@ -148,7 +148,8 @@ public:
 
 private:
   static constexpr std::size_t SIZE = Estimator::SAMPLE_SIZE;
-  static constexpr int FIRST_OPTIMIZED = 50;  ///< at so many samples, the best so far; before, nearly each is the best
+  static constexpr int FIRST_OPTIMIZED =
+      50;  ///< after this many samples the best is; before, nearly each is the best so far
 
   RansacStatistics& statistics()
   {
