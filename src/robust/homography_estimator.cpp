@@ -62,7 +62,7 @@ double HomographyEstimator::error(const Model& model, std::size_t i) const
 std::optional<HomographyEstimator::Model> HomographyEstimator::refit(const Model& /*model*/,
                                                                      const std::vector<int>& inliers) const
 {
-  constexpr int ITERATIONS = 2;  // from the linear estimate: the cost is flat to 1e-4 after two or three
+  constexpr int ITERATIONS = 3;  // from the linear estimate: the cost is flat to 1e-4 after two or three
   const Correspondences pairs = select(pairs_, inliers);
   const auto linear = homographyFromPoints(pairs);
   if (!linear)
