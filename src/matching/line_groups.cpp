@@ -51,6 +51,28 @@ bool isVertical(const Segment& segment)
   return std::abs(d.y()) > std::abs(d.x());
 }
 
+/** pairHypotheses(), but those of at most `min_weight` have any index, since nobody asks for it. */
+std::array<PairHypothesis, 4> likelyHypotheses(const Segment& a, const Segment& b,
+                                               const std::optional<Eigen::Vector2d>& intersection, double collinearity,
+                                               double min_weight)
+{
+  if (!intersection)
+  {
+    const int as_detected = pairIndex(a, b, collinearity);
+    return { { { as_detected, 1.0 }, { as_detected, 0.0 }, { as_detected, 0.0 }, { as_detected, 0.0 } } };
+  }
+  const double wa = std::min(distanceToNearestEnd(a, *intersection) / a.length(), 1.0);
+  const double wb = std::min(distanceToNearestEnd(b, *intersection) / b.length(), 1.0);
+  const Segment longer_a = extended(a, *intersection);
+  const Segment longer_b = extended(b, *intersection);
+  const auto hypothesis = [&](const Segment& first, const Segment& second, double weight) {
+    constexpr int UNASKED = 0;
+    return PairHypothesis{ weight > min_weight ? pairIndex(first, second, collinearity) : UNASKED, weight };
+  };
+  return { { hypothesis(a, b, wa * wb), hypothesis(longer_a, longer_b, (1.0 - wa) * (1.0 - wb)),
+             hypothesis(longer_a, b, (1.0 - wa) * wb), hypothesis(a, longer_b, wa * (1.0 - wb)) } };
+}
+
 /** A pair of neighbours: its segments in their order, where their lines meet, and its possible structures. */
 struct Pair
 {
@@ -213,8 +235,8 @@ private:
     }
     for (Pair& pair : all)
     {
-      pair.hypotheses =
-          pairHypotheses(segment(pair.first), segment(pair.second), pair.intersection, params_.collinearity);
+      pair.hypotheses = likelyHypotheses(segment(pair.first), segment(pair.second), pair.intersection,
+                                         params_.collinearity, params_.min_weight);
     }
     pairs_ = std::move(all);
   }
@@ -317,7 +339,8 @@ private:
       }
     }
     const auto meeting = lineIntersection(segment(j), segment(k), min_sine_);
-    const auto others = pairHypotheses(segment(first), segment(second), meeting, params_.collinearity);
+    const auto others =
+        likelyHypotheses(segment(first), segment(second), meeting, params_.collinearity, params_.min_weight);
     for (const PairHypothesis& h1 : p->hypotheses)
     {
       for (const PairHypothesis& h2 : q->hypotheses)
@@ -351,17 +374,24 @@ private:
 std::vector<float> votesOf(const LineIndex& reference, std::vector<LineGroup>::const_iterator group,
                            std::vector<LineGroup>::const_iterator last, std::size_t columns)
 {
-  const auto by_key = [](const LineGroup& a, const LineGroup& b) {
-    return a.key < b.key;
-  };
   std::vector<float> votes(static_cast<std::size_t>(reference.segmentCount()) * columns, 0.0F);
   const std::vector<LineGroup>& stored = reference.groups();
-  auto from = stored.begin();
+  if (group == last)
+  {
+    return votes;
+  }
+  auto end = std::lower_bound(stored.begin(), stored.end(), *group,
+                              [](const LineGroup& a, const LineGroup& b) { return a.key < b.key; });
   while (group != last)
   {
-    const auto [begin, end] = std::equal_range(from, stored.end(), *group, by_key);
-    from = end;
-    const auto next = std::upper_bound(group, last, *group, by_key);
+    // Both are ordered by key.
+    const std::uint32_t key = group->key;
+    const auto has_key = [key](const LineGroup& one) {
+      return one.key == key;
+    };
+    const auto begin = std::find_if(end, stored.end(), [key](const LineGroup& one) { return one.key >= key; });
+    end = std::find_if_not(begin, stored.end(), has_key);
+    const auto next = std::find_if_not(group, last, has_key);
     const float share = begin == end ? 0.0F : 1.0F / static_cast<float>(end - begin);
     for (; group != next; ++group)
     {
@@ -421,19 +451,8 @@ std::optional<Eigen::Vector2d> lineIntersection(const Segment& a, const Segment&
 std::array<PairHypothesis, 4> pairHypotheses(const Segment& a, const Segment& b,
                                              const std::optional<Eigen::Vector2d>& intersection, double collinearity)
 {
-  const int as_detected = pairIndex(a, b, collinearity);
-  if (!intersection)
-  {
-    return { { { as_detected, 1.0 }, { as_detected, 0.0 }, { as_detected, 0.0 }, { as_detected, 0.0 } } };
-  }
-  const double wa = std::min(distanceToNearestEnd(a, *intersection) / a.length(), 1.0);
-  const double wb = std::min(distanceToNearestEnd(b, *intersection) / b.length(), 1.0);
-  const Segment longer_a = extended(a, *intersection);
-  const Segment longer_b = extended(b, *intersection);
-  return { { { as_detected, wa * wb },
-             { pairIndex(longer_a, longer_b, collinearity), (1.0 - wa) * (1.0 - wb) },
-             { pairIndex(longer_a, b, collinearity), (1.0 - wa) * wb },
-             { pairIndex(a, longer_b, collinearity), wa * (1.0 - wb) } } };
+  constexpr double ALL = -1.0;
+  return likelyHypotheses(a, b, intersection, collinearity, ALL);
 }
 
 std::uint32_t tripletKey(int p1, int p2, int p3, int c, int classes)
