@@ -441,35 +441,15 @@ private:
   /** State, arrival and loss after an image. */
   void judge(double stamp, const PlanarPose& base)
   {
-    constexpr double POSITION_DOUBT = 0.05;       // of where the view is, for the region of interest [m]
-    constexpr double ARRIVED_DISPLACEMENT = 1.5;  // of the view's points, in the median [px]
-    constexpr double ARRIVED_CONFIDENCE = 0.75;   // share of the points that must be there
-    constexpr double AT_VIEW_DISPLACEMENT = 15.0;
-    constexpr int ENOUGH_CORRECTIONS = 10;  // of the scale, each by a fifth, until it is that of metres
-    constexpr double COAST = 0.5;           // matches are older than the image when they come [s]
-    constexpr double LONGEST_BLIND = 3.0;   // that a base goes on by odometry [s]
+    constexpr double COAST = 0.5;          // matches are older than the image when they come [s]
+    constexpr double LONGEST_BLIND = 3.0;  // that a base goes on by odometry [s]
     if (!view_in_odom_)
     {
       giveUpAfter(stamp, started_, "the view was not found", HomingState::ACQUIRING, "looking for the view");
       way_known_ = stamp;
       return;
     }
-    const PlanarPose goal = goalInBase(base);
-    report_.heading = goal.heading();
-    report_.yaw_error = goal.yaw;
-    report_.distance = goal.distance();
-    const double half_width =
-        std::clamp(std::atan2(POSITION_DOUBT, report_.distance), params_.vote.min_half_width, M_PI_2);
-    report_.roi_min = report_.heading - half_width;
-    report_.roi_max = report_.heading + half_width;
-
-    report_.manoeuvre = law_->text();
-    report_.goal_in_odom.reset();
-    if (tracked_ && tracker_.depthsKnown() && scale_corrections_ >= ENOUGH_CORRECTIONS)
-    {
-      report_.goal_in_odom = goalInOdom();
-      report_.goal_covariance = view_covariance_;
-    }
+    const PlanarPose goal = reportGoal(base);
     report_.at_view = false;
     const bool blank = std::isnan(report_.similarity);
     const double unseen = stamp - last_trace_;
@@ -500,6 +480,39 @@ private:
       setState(HomingState::APPROACHING, "the heading is known");
       return;
     }
+    judgePlace(stamp, goal);
+  }
+
+  /** What the report says of the view's pose, once it is known. @return this pose in the base. */
+  PlanarPose reportGoal(const PlanarPose& base)
+  {
+    constexpr double POSITION_DOUBT = 0.05;  // of where the view is, for the region of interest [m]
+    constexpr int ENOUGH_CORRECTIONS = 10;   // of the scale, each by a fifth, until it is that of metres
+    const PlanarPose goal = goalInBase(base);
+    report_.heading = goal.heading();
+    report_.yaw_error = goal.yaw;
+    report_.distance = goal.distance();
+    const double half_width =
+        std::clamp(std::atan2(POSITION_DOUBT, report_.distance), params_.vote.min_half_width, M_PI_2);
+    report_.roi_min = report_.heading - half_width;
+    report_.roi_max = report_.heading + half_width;
+
+    report_.manoeuvre = law_->text();
+    report_.goal_in_odom.reset();
+    if (tracked_ && tracker_.depthsKnown() && scale_corrections_ >= ENOUGH_CORRECTIONS)
+    {
+      report_.goal_in_odom = goalInOdom();
+      report_.goal_covariance = view_covariance_;
+    }
+    return goal;
+  }
+
+  /** State and arrival while the view's points are tracked. */
+  void judgePlace(double stamp, const PlanarPose& goal)
+  {
+    constexpr double ARRIVED_DISPLACEMENT = 1.5;  // of the view's points, in the median [px]
+    constexpr double ARRIVED_CONFIDENCE = 0.75;   // share of the points that must be there
+    constexpr double AT_VIEW_DISPLACEMENT = 15.0;
     // Whatever the structure and its scale say, the points must be where the view has them.
     const bool in_place = report_.displacement <= ARRIVED_DISPLACEMENT && report_.confidence >= ARRIVED_CONFIDENCE &&
                           report_.similarity >= params_.min_similarity;
