@@ -94,9 +94,9 @@ struct HomingReport
   double confidence = 0.0;
   /** HeadingHistogram::votesFor() base_link, of the last matches used; empty before. */
   std::vector<double> histogram;
-  /** Rightmost heading in base_link at which the view is expected next, positive to the left, >= -pi/2 [rad]. */
+  /** Right end of the headings in base_link at which the view is expected next, positive to the left; may pass -pi [rad]. */
   double roi_min = std::numeric_limits<double>::quiet_NaN();
-  double roi_max = std::numeric_limits<double>::quiet_NaN();     ///< the leftmost, <= pi/2 [rad]
+  double roi_max = std::numeric_limits<double>::quiet_NaN();     ///< left end; may pass pi [rad]
   double similarity = std::numeric_limits<double>::quiet_NaN();  ///< gradientSimilarity(), in [-1, 1]
   /**
    * Median distance of the view's points from their places in the view, in the last image in which they were found
