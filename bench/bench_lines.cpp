@@ -14,6 +14,7 @@
  * - time: processor time of everything from two images to matches, and of one live image against a stored one, for
  *   images of 640x480 with at most 300 segments, beside LSD with LBD and EDLines with LBD.
  */
+#include "options.h"
 #include "timing.h"
 
 #include "experiments/line_ground_truth.h"
@@ -409,34 +410,17 @@ int runTime(const std::filesystem::path& data, LineMatcherParams params, int run
 
 int main(int argc, char** argv)
 {
-  const std::vector<std::string> arguments(argv + 1, argv + argc);
   LineMatcherParams params;
-  int runs = 7;
+  constexpr int RUNS = 7;
   try
   {
-    for (std::size_t i = 1; i + 1 < arguments.size(); i += 2)
-    {
-      const std::string& value = arguments[i + 1];
-      const std::size_t equals = value.find('=');
-      if (arguments[i] == "--runs")
-      {
-        runs = std::stoi(value);
-      }
-      else if (arguments[i] == "--set" && equals != std::string::npos)
-      {
-        setParameter(parameters(params), value.substr(0, equals), value.substr(equals + 1));
-      }
-      else
-      {
-        throw std::invalid_argument("unknown option " + arguments[i]);
-      }
-    }
+    const BenchOptions options = readOptions(argc, argv, RUNS, parameters(params));
     const auto data = dataFolder();
     if (!data)
     {
       return 2;
     }
-    const std::string mode = arguments.empty() ? "" : arguments.front();
+    const std::string& mode = options.mode;
     if (mode == "benchmark")
     {
       return runBenchmark(*data, LineViewMatcher(params));
@@ -451,7 +435,7 @@ int main(int argc, char** argv)
     }
     if (mode == "time")
     {
-      return runTime(*data, params, runs);
+      return runTime(*data, params, options.runs);
     }
     std::cerr << "usage: bench_lines benchmark|roll|merton|time [--runs N] [--set name=value ...]" << std::endl;
   }

@@ -13,6 +13,7 @@
  * - time: medians of a match against a stored reference, of one of two fresh images, and of one where there is nothing to be
  *   found, in processor time, beside ORB, AKAZE and SIFT.
  */
+#include "options.h"
 #include "timing.h"
 
 #include "experiments/peer_matches.h"
@@ -570,32 +571,13 @@ int memory(const PointViewMatcherParams& params)
 
 int main(int argc, char** argv)
 {
-  const std::string usage = "usage: bench_points oxford|tilt|time|memory [--runs N] [--set name=value ...]\n";
   PointViewMatcherParams params;
-  int runs = 15;
+  constexpr int RUNS = 15;
   try
   {
-    for (int i = 2; i + 1 < argc; i += 2)
-    {
-      const std::string option = argv[i];
-      const std::string value = argv[i + 1];
-      const std::size_t equals = value.find('=');
-      if (option == "--runs")
-      {
-        runs = std::max(1, std::stoi(value));
-      }
-      else if (option == "--set" && equals != std::string::npos)
-      {
-        setParameter(parameters(params), value.substr(0, equals), value.substr(equals + 1));
-      }
-      else
-      {
-        std::cerr << usage;
-        return 2;
-      }
-    }
+    const BenchOptions options = readOptions(argc, argv, RUNS, parameters(params));
     cv::setNumThreads(2);
-    const std::string mode = argc > 1 ? argv[1] : "";
+    const std::string& mode = options.mode;
     if (mode == "oxford")
     {
       return oxford(params);
@@ -606,7 +588,7 @@ int main(int argc, char** argv)
     }
     if (mode == "time")
     {
-      return timing(params, runs);
+      return timing(params, options.runs);
     }
     if (mode == "memory")
     {
@@ -618,6 +600,6 @@ int main(int argc, char** argv)
     std::cerr << error.what() << "\n";
     return 2;
   }
-  std::cerr << usage;
+  std::cerr << "usage: bench_points oxford|tilt|time|memory [--runs N] [--set name=value ...]\n";
   return 2;
 }

@@ -10,6 +10,7 @@
  * outliers. For each share of outliers: processor time, and the distance of noise-free pairs from the estimated
  * geometry, both medians over N draws, and in brackets as ratios to MAGSAC. For F also with polishFundamental().
  */
+#include "options.h"
 #include "timing.h"
 #include "view_servo/geometry/fundamental.h"
 #include "view_servo/geometry/homography.h"
@@ -214,39 +215,17 @@ void compareAll(bool planar, const RansacParams& params, int runs, std::uint64_t
 
 int main(int argc, char** argv)
 {
-  const std::vector<std::string> arguments(argv + 1, argv + argc);
   RansacParams params;
   params.inlier_threshold = THRESHOLD;
   params.sampling = Sampling::UNIFORM;  // the draws have no order
-  int runs = 100;
-  int seed = 1;
+  constexpr int RUNS = 100;
   try
   {
-    for (std::size_t i = 1; i + 1 < arguments.size(); i += 2)
-    {
-      const std::string& value = arguments[i + 1];
-      const std::size_t equals = value.find('=');
-      if (arguments[i] == "--runs")
-      {
-        runs = std::stoi(value);
-      }
-      else if (arguments[i] == "--seed")
-      {
-        seed = std::stoi(value);
-      }
-      else if (arguments[i] == "--set" && equals != std::string::npos)
-      {
-        setParameter(parameters(params), value.substr(0, equals), value.substr(equals + 1));
-      }
-      else
-      {
-        throw std::invalid_argument("unknown option " + arguments[i]);
-      }
-    }
-    const std::string mode = arguments.empty() ? "" : arguments.front();
+    const BenchOptions options = readOptions(argc, argv, RUNS, parameters(params));
+    const std::string& mode = options.mode;
     if (mode == "fundamental" || mode == "homography")
     {
-      compareAll(mode == "homography", params, runs, static_cast<std::uint64_t>(seed));
+      compareAll(mode == "homography", params, options.runs, options.seed);
       return 0;
     }
     std::cerr << "usage: bench_robust fundamental|homography [--runs N] [--seed N] [--set name=value ...]" << std::endl;
