@@ -125,6 +125,19 @@ double sideCorrelation(const cv::Mat& reference, const cv::Mat& current, const E
     return there.z() > 0.0F && to.contains(there.x() / there.z(), there.y() / there.z());
   };
 
+  // Between ends that are this far inside, and of about one depth, rounding puts no sample outside.
+  constexpr float SLACK = 0.05F;     // [px]
+  constexpr float MAX_RATIO = 4.0F;  // of the third coordinates of the two ends
+  const auto well_inside = [](const BilinearSampler& image, const Eigen::Vector2f& at) {
+    return image.contains(at.x(), at.y()) && image.contains(at.x() + SLACK, at.y() + SLACK);
+  };
+  const auto all_inside = [&](const Eigen::Vector2f(&here)[2], const Eigen::Vector3f(&there)[2]) {
+    const float z[2] = { there[0].z(), there[1].z() };
+    return z[0] > 0.0F && z[1] > 0.0F && z[0] < MAX_RATIO * z[1] && z[1] < MAX_RATIO * z[0] &&
+           well_inside(from, here[0]) && well_inside(from, here[1]) && well_inside(to, there[0].hnormalized()) &&
+           well_inside(to, there[1].hnormalized());
+  };
+
   // Lines of samples beside the segment, and what the homography makes of them.
   const double step = (last - first) / ALONG;
   const Eigen::Vector2f step_here = (step * along).cast<float>();
@@ -141,10 +154,7 @@ double sideCorrelation(const cv::Mat& reference, const cv::Mat& current, const E
       const float offset = side * (FIRST + STEP * static_cast<float>(j));
       const Eigen::Vector2f here = begin_here + offset * normal.cast<float>();
       const Eigen::Vector3f there = begin_there + offset * normal_there.cast<float>();
-      const Eigen::Vector2f end_here = here + (ALONG - 1) * step_here;
-      const Eigen::Vector3f end_there = there + (ALONG - 1) * step_there;
-      if (from.contains(here.x(), here.y()) && from.contains(end_here.x(), end_here.y()) && seen(there) &&
-          seen(end_there))
+      if (all_inside({ here, here + (ALONG - 1) * step_here }, { there, there + (ALONG - 1) * step_there }))
       {
         float values_here[ALONG];
         float values_there[ALONG];

@@ -3,6 +3,7 @@
 #include "view_servo/features/side_correlation.h"
 
 #include "support/textured_plane.h"
+#include "view_servo/robust/random.h"
 
 #include <gtest/gtest.h>
 #include <Eigen/Geometry>
@@ -68,6 +69,28 @@ TEST(SideCorrelation, KnowsNothingWhereThereIsNothingToSee)
   Eigen::Matrix3d away = identity;
   away(0, 2) = 1000.0;
   EXPECT_EQ(sideCorrelation(flat, flat, away, segment, transferred(away, segment)), -1.0);
+}
+
+/** AddressSanitizer sees whether a sample is read beside the image. */
+TEST(SideCorrelation, ReadsNothingBesideTheImages)
+{
+  const cv::Mat image = test::texturedPicture(1, SIZE);
+  Rng rng(1);
+  for (int i = 0; i < 5000; ++i)
+  {
+    // Near the borders, by maps that leave them about where they are.
+    const auto near_border = [&rng](int size) {
+      return (uniform(rng, 0.0, 1.0) < 0.5 ? 0.0 : size - 1.0) + uniform(rng, -12.0, 12.0);
+    };
+    Eigen::Matrix3d h = Eigen::Matrix3d::Identity();
+    h.topRightCorner<2, 1>() << uniform(rng, -2.0, 2.0), uniform(rng, -2.0, 2.0);
+    h.bottomLeftCorner<1, 2>() << uniform(rng, -2e-3, 2e-3), uniform(rng, -2e-3, 2e-3);
+    const Segment segment{ { near_border(SIZE.width), near_border(SIZE.height) },
+                           { near_border(SIZE.width), near_border(SIZE.height) } };
+    const double found = sideCorrelation(image, image, h, segment, transferred(h, segment));
+    EXPECT_GE(found, -1.0);
+    EXPECT_LE(found, 1.0);
+  }
 }
 
 }  // namespace view_servo
