@@ -98,24 +98,9 @@ private:
  * Matches images by the structure of groups of their line segments: two given ones on request, and, when a view is set,
  * each camera image with that stored view.
  *
- * Parameters, all private; config/line_matcher.yaml has them with their ranges:
- *  - `~view`, `~rate`, `~views_dir`, `~allow_paths`, `~image_patience`, `~image_transport`, `~queue_size`,
- *    `~max_image_age`: see StreamingMatcher;
- *  - those of the matcher, see parameters(LineMatcherParams&).
- *
- * Subscribes:
- *  - `image_raw` (sensor_msgs/Image), `camera_info` (sensor_msgs/CameraInfo);
- *  - `wanted_view` (view_servo/WantedView): the view that a driver wants matched; an empty one ends that.
- *
- * Publishes:
- *  - `~line_matches` (view_servo/LineMatches): for each image matched, with the image's header; refused, with the reason,
- *    when the view cannot be matched; nothing while the camera is not calibrated;
- *  - `~overlay` (sensor_msgs/Image, bgr8): reference and image side by side; drawn when somebody listens;
- *  - `/diagnostics` (diagnostic_msgs/DiagnosticArray): 1 Hz, camera and matching.
- *
- * Services:
- *  - `~match` (view_servo/MatchLines): matches two images;
- *  - `~set_view` (view_servo/SetView): sets or, with "", unsets the view; refused when it cannot be read.
+ * Topics, services and parameters are those of a StreamingMatcher, with parameters(LineMatcherParams&);
+ * config/line_matcher.yaml has them with their ranges. It publishes `~line_matches` (view_servo/LineMatches), and its
+ * service is `~match` (view_servo/MatchLines).
  */
 using LineMatcherNode = StreamingMatcher<LineMatching>;
 

@@ -204,24 +204,9 @@ private:
  * ones on request, and, when a view is set, each camera image with that stored view. Where both images are calibrated,
  * the answer has the motion between the cameras, up to the distance.
  *
- * Parameters, all private; config/scene_matcher.yaml has them with their ranges:
- *  - `~view`, `~rate`, `~views_dir`, `~allow_paths`, `~image_patience`, `~image_transport`, `~queue_size`,
- *    `~max_image_age`: see StreamingMatcher;
- *  - those of the matcher, see parameters(SceneMatcherParams&).
- *
- * Subscribes:
- *  - `image_raw` (sensor_msgs/Image), `camera_info` (sensor_msgs/CameraInfo);
- *  - `wanted_view` (view_servo/WantedView): the view that a driver wants matched; an empty one ends that.
- *
- * Publishes:
- *  - `~scene_matches` (view_servo/SceneMatches): for each image matched, with the image's header; refused, with the
- *    reason, when the view cannot be matched; nothing while the camera is not calibrated;
- *  - `~overlay` (sensor_msgs/Image, bgr8): reference and image side by side; drawn when somebody listens;
- *  - `/diagnostics` (diagnostic_msgs/DiagnosticArray): 1 Hz, camera and matching.
- *
- * Services:
- *  - `~match` (view_servo/MatchScene): matches two images;
- *  - `~set_view` (view_servo/SetView): sets or, with "", unsets the view; refused when it cannot be read.
+ * Topics, services and parameters are those of a StreamingMatcher, with parameters(SceneMatcherParams&);
+ * config/scene_matcher.yaml has them with their ranges. It publishes `~scene_matches` (view_servo/SceneMatches), and its
+ * service is `~match` (view_servo/MatchScene).
  */
 using SceneMatcherNode = StreamingMatcher<SceneMatching>;
 

@@ -82,11 +82,22 @@ struct MatchLabel
 
 /**
  * A node that matches images: two given ones on request, and, when a view is chosen, each camera image with that stored
- * view. Parameters, all private:
- *  - `~view`, `~rate`: see parameters(StreamingMatcherParams&); by default the rate is Matching::RATE;
- *  - `~views_dir`, `~allow_paths`: see ImageSourceReader;
- *  - `~image_transport`, `~queue_size`, `~max_image_age`: see CameraInput;
- *  - those of Matching.
+ * view. Parameters, all private: those of parameters(StreamingMatcherParams&), with the rate Matching::RATE by default, and
+ * those of Matching.
+ *
+ * Subscribes:
+ *  - `image_raw` (sensor_msgs/Image), `camera_info` (sensor_msgs/CameraInfo);
+ *  - `wanted_view` (view_servo/WantedView): the view that a driver wants matched; an empty one ends that.
+ *
+ * Publishes:
+ *  - `~TOPIC` (Matching::Message): for each image matched, with the image's header; nothing while the camera is not
+ *    calibrated;
+ *  - `~overlay` (sensor_msgs/Image, bgr8): reference and image side by side; drawn when somebody listens;
+ *  - `/diagnostics` (diagnostic_msgs/DiagnosticArray): 1 Hz, camera and matching.
+ *
+ * Services:
+ *  - `~match` (Matching::Service): matches two images;
+ *  - `~set_view` (view_servo/SetView): sets or, with "", unsets the view; refused when it cannot be read.
  *
  * The view is chosen by `~view`, by people with `~set_view`, and by a driver with a message on `wanted_view`
  * (view_servo/WantedView); see ViewChoice. Every message says which view and which driver's goal it is about, and why
