@@ -41,6 +41,5 @@ RunOutcome run(ros::NodeHandle& nh, const sim::World& world, const RunParams& pa
  */
 int main(int argc, char** argv)
 {
-  return view_servo::runSimulation(argc, argv, "run_arm", "servo",
-                                   { "rice", "near", "demo", 60.0, view_servo::START_PATIENCE, {} }, view_servo::run);
+  return view_servo::runSimulation(argc, argv, "run_arm", "servo", {}, view_servo::run);
 }

@@ -71,7 +71,5 @@ RunOutcome run(ros::NodeHandle& nh, const sim::World& world, const RunParams& pa
  */
 int main(int argc, char** argv)
 {
-  return view_servo::runSimulation(argc, argv, "run_homing", "homing",
-                                   { "desk", "thesis", "demo", 120.0, view_servo::START_PATIENCE, {} },
-                                   view_servo::run);
+  return view_servo::runSimulation(argc, argv, "run_homing", "homing", view_servo::homingRunParams(), view_servo::run);
 }

@@ -4,6 +4,7 @@
 
 #include "sim/world_reader.h"
 #include "sim_ros/robot_messages.h"
+#include "sim_ros/run_params.h"
 #include "view_servo/SaveView.h"
 #include "view_servo/ServoStatus.h"
 #include "view_servo/SetPose.h"
@@ -41,17 +42,6 @@
 
 namespace view_servo
 {
-/** The parameters of a run. */
-struct RunParams
-{
-  std::string world;
-  std::string start;                                ///< where the robot begins, as the program describes it
-  std::string view = "demo";                        ///< the name that the view is stored by
-  double timeout;                                   ///< of the goal [s]
-  double patience = START_PATIENCE;                 ///< longest wait for another node [s]
-  std::function<void(const std::string&)> give_up;  ///< ends the process as a failed run, for the reason given
-};
-
 /**
  * The steps of a run of a simulated robot, which are the same for both robots: the view is stored at the world's goal,
  * the robot is put at a start, and the action that brings it back is called. How far off it ends is measured by the
@@ -358,7 +348,7 @@ inline void endWithRoslaunch()
 }
 
 /**
- * main() of a program that runs a simulated robot once. Its parameters, all private, are in the table below. With `~exit`
+ * main() of a program that runs a simulated robot once. Its parameters, all private, are those of RunParams. With `~exit`
  * it ends afterwards, with status 0 when the robot is at the view and 1 when not, and roslaunch ends, too, when that has
  * started the program.
  *
@@ -373,15 +363,13 @@ inline int runSimulation(int argc, char** argv, const std::string& name, const s
   ros::NodeHandle nh;
   ros::AsyncSpinner spinner(2);
   spinner.start();
-  bool exit = true;
-  std::string result_file;
   const auto end = [&](const RunOutcome& outcome) {
     (outcome.success ? std::cout : std::cerr) << what << ": " << outcome.summary << std::endl;
-    if (!result_file.empty())
+    if (!params.result.empty())
     {
-      std::ofstream(result_file) << (outcome.success ? 0 : 1) << ' ' << outcome.summary << std::endl;
+      std::ofstream(params.result) << (outcome.success ? 0 : 1) << ' ' << outcome.summary << std::endl;
     }
-    if (exit)
+    if (params.exit)
     {
       endWithRoslaunch();
     }
@@ -398,15 +386,7 @@ inline int runSimulation(int argc, char** argv, const std::string& name, const s
   try
   {
     ParameterReader reader(ros::NodeHandle("~"));
-    const std::vector<Parameter> table{
-      text("world", params.world, "a world's file, or the name of one in config/worlds/"),
-      text("start", params.start, "where the robot starts, one of the world's starts"),
-      text("view", params.view, "name under which the view is stored"),
-      real("timeout", params.timeout, "s", "> 0", "time limit of the goal"),
-      real("patience", params.patience, "s", "> 0", "longest wait for another node"),
-      text("result", result_file, "file that the outcome is written to; empty: none"),
-      boolean("exit", exit, "whether the program ends after the run, and roslaunch with it"),
-    };
+    const std::vector<Parameter> table = parameters(params);
     reader.read(table);
     reader.addFaults(faultsOf(table));
     reader.finish();

@@ -5,6 +5,10 @@
  * The files in config/ and the tables in docs/parameters*.md say what the tables of parameters in the sources say: names,
  * types, defaults, units, ranges and meanings. VIEW_SERVO_UPDATE=1 writes them anew.
  */
+#include "sim/nomad.h"
+#include "sim/puma.h"
+#include "sim_ros/run_params.h"
+#include "sim_ros/simulation_params.h"
 #include "test_paths.h"
 #include "view_servo/parameters/parameter.h"
 #include "view_servo/ros/driver_params.h"
@@ -43,6 +47,11 @@ public:
   HomographyTrackerNodeParams tracker;
   ServoDriverParams servo;
   ViewStoreNodeParams store;
+  sim::SimulationParams simulation;
+  sim::NomadParams nomad;
+  sim::PumaParams puma;
+  RunParams homing_run = homingRunParams();
+  RunParams arm_run;
 
   Tables()
   {
@@ -85,6 +94,12 @@ public:
           { "## Homography tracker", parameters(tracker) },
           { "## 2.5D servoing", parameters(servo) },
           { "## View store", parameters(store) } } },
+      { "parameters_of_simulation",
+        { { "## Both robots", parameters(simulation) },
+          { "## The base", parameters(nomad) },
+          { "## The arm", parameters(puma) },
+          { "## A run of the base", parameters(homing_run) },
+          { "## A run of the arm", parameters(arm_run) } } },
     };
   }
 };
