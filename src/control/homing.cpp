@@ -661,7 +661,7 @@ Homing::Homing(const HomingParams& params, HomingTarget target)
 {
 }
 
-void Homing::addMatches(double stamp, const Correspondences& pixels, const std::vector<double>& weights)
+void Homing::addMatches(double stamp, const HeadingEvidence& pixels)
 {
   const std::optional<PlanarPose> base = odometry_.at(stamp);
   if (!base)
@@ -670,7 +670,7 @@ void Homing::addMatches(double stamp, const Correspondences& pixels, const std::
   }
   Points reference;
   Points current;
-  for (const Correspondence& pair : pixels)
+  for (const Correspondence& pair : pixels.pairs)
   {
     reference.push_back(pair.reference);
     current.push_back(pair.current);
@@ -678,13 +678,13 @@ void Homing::addMatches(double stamp, const Correspondences& pixels, const std::
   reference = target_.view_camera.normalized(reference);
   current = target_.camera.normalized(current);
   HeadingEvidence evidence;
-  for (std::size_t i = 0; i < pixels.size(); ++i)
+  for (std::size_t i = 0; i < pixels.pairs.size(); ++i)
   {
     const Correspondence pair{ target_.mount.level(reference[i]), target_.mount.level(current[i]) };
     if (pair.reference.allFinite() && pair.current.allFinite())
     {
       evidence.pairs.push_back(pair);
-      evidence.weights.push_back(weights[i]);
+      evidence.weights.push_back(pixels.weights[i]);
     }
   }
   onMatches(stamp, evidence, compose(*base, target_.mount.on_base));

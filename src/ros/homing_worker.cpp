@@ -93,7 +93,7 @@ void HomingWorker::add(const Inputs& inputs, Homing& homing) const
   }
   for (const auto& [stamp, evidence] : inputs.matches)
   {
-    homing.addMatches(stamp, evidence.pairs, evidence.weights);
+    homing.addMatches(stamp, evidence);
   }
   if (inputs.frame)
   {

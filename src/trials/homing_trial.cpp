@@ -97,20 +97,19 @@ HomingTrials::~HomingTrials() = default;
 namespace
 {
 /** What a matcher finds in an image. */
-struct StampedMatches
+struct StampedEvidence
 {
   double stamp;  // [s]
-  Correspondences pixels;
-  std::vector<double> weights;
+  HeadingEvidence pixels;
 };
 
-StampedMatches toMatches(double stamp, const ViewMatch& match)
+StampedEvidence toEvidence(double stamp, const ViewMatch& match)
 {
-  StampedMatches result{ stamp, {}, {} };
+  StampedEvidence result{ stamp, {} };
   for (const MatchedPoint& point : match.matches)
   {
-    result.pixels.push_back(point.position);
-    result.weights.push_back(point.score);
+    result.pixels.pairs.push_back(point.position);
+    result.pixels.weights.push_back(point.score);
   }
   return result;
 }
@@ -218,13 +217,14 @@ private:
     const PreparedImage current(image, cv::Rect(), parts_.features);
     if (by_points)
     {
-      matches_.add(ready, toMatches(time_, parts_.points.match(*parts_.reference, current, GeometryModel::HOMOGRAPHY)));
+      matches_.add(ready,
+                   toEvidence(time_, parts_.points.match(*parts_.reference, current, GeometryModel::HOMOGRAPHY)));
     }
     if (by_lines)
     {
       const LineGrouping groups = params_.line_pairs ? LineGrouping::PAIRS : LineGrouping::TRIPLETS;
-      matches_.add(ready,
-                   toMatches(time_, parts_.lines.match(*parts_.reference, current, GeometryModel::HOMOGRAPHY, groups)));
+      matches_.add(
+          ready, toEvidence(time_, parts_.lines.match(*parts_.reference, current, GeometryModel::HOMOGRAPHY, groups)));
     }
   }
 
@@ -246,9 +246,9 @@ private:
 
   void deliverMatches()
   {
-    if (const std::optional<StampedMatches> ready = matches_.take(time_))
+    if (const std::optional<StampedEvidence> ready = matches_.take(time_))
     {
-      homing_->addMatches(ready->stamp, ready->pixels, ready->weights);
+      homing_->addMatches(ready->stamp, ready->pixels);
     }
   }
 
@@ -306,7 +306,7 @@ private:
   Every points_due_;
   Every lines_due_;
   Delayed<StampedImage> images_;
-  Delayed<StampedMatches> matches_;
+  Delayed<StampedEvidence> matches_;
   PlanarPose last_;
   double travelled_ = 0.0;
   double sense_ = 0.0;  // last speed ahead or back that was one [m/s]

@@ -41,6 +41,11 @@ Eigen::Isometry3d mounted(const PlanarPose& on_base)
   return camera;
 }
 
+HeadingEvidence equallyTrusted(const Correspondences& matches)
+{
+  return { matches, std::vector<double>(matches.size(), 1.0) };
+}
+
 /**
  * What a camera stored when its base was in the origin of odometry's frame: below the horizon a wall 1.8 m away, above
  * it another, 3.5 m away. A single wall would leave open what is turn and what is motion to the side.
@@ -198,7 +203,7 @@ public:
       const bool any = sight == Sight::RANDOM_MATCHES || sight == Sight::WRONG_MATCHES;
       const Correspondences pairs =
           walls_.matches(base_, sight == Sight::WALLS || sight == Sight::NOISY ? 60 : 0, any ? 60 : 0, rng_);
-      homing_->addMatches(time(), pairs, std::vector<double>(pairs.size(), 1.0));
+      homing_->addMatches(time(), equallyTrusted(pairs));
     }
     const BaseVelocity wanted = homing_->command();
     if (wanted.isZero())
@@ -373,12 +378,12 @@ TEST(Homing, MatchesWithoutOdometryOfTheirTimeSayNothing)
   Rng rng(1);
   for (int i = 0; i < 5; ++i)
   {
-    homing->addMatches(0.5 + 0.1 * i, walls.matches(base, 60, 0, rng), std::vector<double>(60, 1.0));
+    homing->addMatches(0.5 + 0.1 * i, equallyTrusted(walls.matches(base, 60, 0, rng)));
   }
   homing->addOdometry(1.0, base);
   for (int i = 0; i < 5; ++i)
   {
-    homing->addMatches(0.5 + 0.1 * i, walls.matches(base, 60, 0, rng), std::vector<double>(60, 1.0));
+    homing->addMatches(0.5 + 0.1 * i, equallyTrusted(walls.matches(base, 60, 0, rng)));
   }
   EXPECT_TRUE(homing->command().isZero());
   EXPECT_TRUE(homing->report().histogram.empty());
@@ -426,9 +431,9 @@ TEST(Homing, OneSetOfMatchesIsNotFollowed)
   Rng rng(2);
   homing->addOdometry(1.0, base);
   homing->addImage(1.0, walls.image(base));
-  homing->addMatches(1.0, walls.matches(base, 60, 20, rng), std::vector<double>(80, 1.0));
+  homing->addMatches(1.0, equallyTrusted(walls.matches(base, 60, 20, rng)));
   EXPECT_TRUE(homing->command().isZero());
-  homing->addMatches(1.0, walls.matches(base, 60, 20, rng), std::vector<double>(80, 1.0));
+  homing->addMatches(1.0, equallyTrusted(walls.matches(base, 60, 20, rng)));
   homing->addImage(1.0, walls.image(base));
   EXPECT_FALSE(homing->command().isZero());
 }
@@ -448,7 +453,7 @@ TEST(Homing, MatchesGiveTheDirectionInBaseLink)
     homing->addOdometry(1.0, base);
     for (int i = 0; i < 2; ++i)
     {
-      homing->addMatches(1.0, walls.matches(base, 60, 20, rng), std::vector<double>(80, 1.0));
+      homing->addMatches(1.0, equallyTrusted(walls.matches(base, 60, 20, rng)));
     }
     // In this image the view's points are not found.
     homing->addImage(1.0, test::texturedPicture(99, cv::Size(Walls::WIDTH, Walls::HEIGHT)));
@@ -741,7 +746,7 @@ TEST(ThesisHoming, KeepsTheDirectionOfTheStepThoughTheBaseTurns)
   {
     homing->addOdometry(1.0 + 0.1 * i, start);
     homing->addImage(1.0 + 0.1 * i, walls.image(start));
-    homing->addMatches(1.0 + 0.1 * i, walls.matches(start, 60, 20, rng), std::vector<double>(80, 1.0));
+    homing->addMatches(1.0 + 0.1 * i, equallyTrusted(walls.matches(start, 60, 20, rng)));
   }
   const BaseVelocity before = homing->command();
   ASSERT_GT(before.norm(), 0.0);

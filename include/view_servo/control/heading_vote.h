@@ -19,7 +19,7 @@ namespace view_servo
 struct HeadingEvidence
 {
   Correspondences pairs;
-  std::vector<double> weights;  ///< one for each pair, >= 0
+  std::vector<double> weights;  ///< one for each pair, >= 0: how much the matcher trusts it
 };
 
 /** Options of the heading vote. */

@@ -147,9 +147,8 @@ public:
   /**
    * Matches of an image. They may come after newer images, and from several matchers in turn.
    * @param pixels in the raw images, `reference` in the stored one.
-   * @param weights one for each match, >= 0: how much the matcher trusts it.
    */
-  void addMatches(double stamp, const Correspondences& pixels, const std::vector<double>& weights);
+  void addMatches(double stamp, const HeadingEvidence& pixels);
 
   /** @param grey 8-bit, one channel. @throws std::invalid_argument when it has another size than the camera. */
   void addImage(double stamp, const cv::Mat& grey);
