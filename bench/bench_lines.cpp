@@ -21,6 +21,7 @@
 #include "view_servo/geometry/fundamental.h"
 #include "view_servo/images/image_io.h"
 #include "view_servo/parameters/parameter.h"
+#include "view_servo/robust/quantile.h"
 #include "view_servo/views/line_view_matcher.h"
 
 #include <Eigen/Geometry>
@@ -264,7 +265,7 @@ int runMerton(const std::filesystem::path& data, const LineViewMatcher& matcher)
     }
     std::printf("%-12s %4zu %4zu %6zu %7d of %3zu %13.2f   median %.2f of %zu, planes of", pair.name.c_str(),
                 reference.segments().size(), current.segments().size(), result.lines.size(), result.inliers,
-                result.matches.size(), residuals / std::max(1, result.inliers), median(errors), errors.size());
+                result.matches.size(), residuals / std::max(1, result.inliers), medianOf(errors), errors.size());
     for (std::size_t k = 0; k < result.planes.size(); ++k)
     {
       std::printf(" %ld", std::count_if(result.lines.begin(), result.lines.end(),
@@ -383,8 +384,8 @@ int runTime(const std::filesystem::path& data, LineMatcherParams params, int run
       std::printf("%-20s %8zu", pair.name.c_str(), reference->segments().size());
       for (std::size_t i = 0; i < timings.size(); ++i)
       {
-        const double fresh = median(timings[i].fresh);
-        const double stored = median(timings[i].stored);
+        const double fresh = medianOf(timings[i].fresh);
+        const double stored = medianOf(timings[i].stored);
         sums[2 * i] += fresh;
         sums[2 * i + 1] += stored;
         std::printf(" %12.1f %8.1f", fresh, stored);

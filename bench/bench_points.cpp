@@ -18,6 +18,7 @@
 
 #include "experiments/peer_matches.h"
 #include "view_servo/parameters/parameter.h"
+#include "view_servo/robust/quantile.h"
 #include "view_servo/views/point_view_matcher.h"
 
 #include <Eigen/Geometry>
@@ -533,8 +534,8 @@ int timing(const PointViewMatcherParams& params, int runs)
         problem.name.c_str(), threads, runs, "", "stored", "fresh", "nothing", "correct inliers");
     for (const Timing& timing : timings)
     {
-      std::printf("%-12s%9.1f%9.1f%9.1f%18d\n", timing.name.c_str(), median(timing.stored), median(timing.fresh),
-                  median(timing.nothing), correct(timing.answer.inliers, problem.truth));
+      std::printf("%-12s%9.1f%9.1f%9.1f%18d\n", timing.name.c_str(), medianOf(timing.stored), medianOf(timing.fresh),
+                  medianOf(timing.nothing), correct(timing.answer.inliers, problem.truth));
     }
     std::printf("stages of view_servo, by the clock:\n");
     for (std::size_t i = 0; i < stages.size(); ++i)
@@ -542,7 +543,7 @@ int timing(const PointViewMatcherParams& params, int runs)
       std::vector<double> ms(all_stages.size());
       std::transform(all_stages.begin(), all_stages.end(), ms.begin(),
                      [i](const std::vector<StageTime>& run) { return run[i].ms; });
-      std::printf("  %-20s%7.1f\n", stages[i].name.c_str(), median(ms));
+      std::printf("  %-20s%7.1f\n", stages[i].name.c_str(), medianOf(ms));
     }
   }
   return 0;

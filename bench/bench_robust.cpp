@@ -17,6 +17,7 @@
 #include "view_servo/parameters/parameter.h"
 #include "view_servo/robust/fundamental_estimator.h"
 #include "view_servo/robust/homography_estimator.h"
+#include "view_servo/robust/quantile.h"
 #include "view_servo/robust/random.h"
 #include "view_servo/robust/ransac.h"
 
@@ -203,9 +204,9 @@ void compareAll(bool planar, const RansacParams& params, int runs, std::uint64_t
     std::printf("%3.0f %% outliers", 100.0 * outliers);
     for (const Method& method : methods)
     {
-      std::printf("   %s %.2f ms (%.2f) %.3f px (%.2f)", method.name.c_str(), median(method.times),
-                  median(method.times) / median(methods.front().times), median(method.errors),
-                  median(method.errors) / median(methods.front().errors));
+      std::printf("   %s %.2f ms (%.2f) %.3f px (%.2f)", method.name.c_str(), medianOf(method.times),
+                  medianOf(method.times) / medianOf(methods.front().times), medianOf(method.errors),
+                  medianOf(method.errors) / medianOf(methods.front().errors));
     }
     std::printf("\n");
   }

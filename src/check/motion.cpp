@@ -4,8 +4,8 @@
 
 #include "view_servo/geometry/euclidean_homography.h"
 #include "view_servo/geometry/homography.h"
-#include "view_servo/robust/median.h"
 #include "view_servo/robust/planar_motion_estimator.h"
+#include "view_servo/robust/quantile.h"
 #include "view_servo/robust/ransac.h"
 #include "view_servo/views/point_view_matcher.h"
 

@@ -5,7 +5,7 @@
 #include "view_servo/features/corners.h"
 #include "view_servo/features/line_segments.h"
 #include "view_servo/images/image_io.h"
-#include "view_servo/robust/median.h"
+#include "view_servo/robust/quantile.h"
 
 #include <opencv2/imgproc.hpp>
 

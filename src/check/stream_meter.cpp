@@ -3,6 +3,7 @@
 #include "check/stream_meter.h"
 
 #include "view_servo/geometry/planar_pose.h"
+#include "view_servo/robust/quantile.h"
 
 #include <algorithm>
 #include <cmath>
@@ -12,14 +13,6 @@ namespace view_servo::check
 {
 namespace
 {
-/** The value that a part of the values are not above; the values must not be empty. */
-double quantile(std::vector<double> values, double part)
-{
-  const auto place = static_cast<std::ptrdiff_t>(part * static_cast<double>(values.size() - 1));
-  std::nth_element(values.begin(), values.begin() + place, values.end());
-  return values[static_cast<std::size_t>(place)];
-}
-
 double mean(const std::vector<double>& values)
 {
   double sum = 0.0;
@@ -58,7 +51,7 @@ void StreamMeter::fill(StreamObservations& stream) const
   {
     return;
   }
-  stream.age = quantile(ages_, 0.5);
+  stream.age = medianOf(ages_);
   stream.late_share = static_cast<double>(late_) / static_cast<double>(times_.size());
   std::vector<double> gaps;
   for (std::size_t i = 1; i < times_.size(); ++i)
@@ -69,7 +62,7 @@ void StreamMeter::fill(StreamObservations& stream) const
   if (duration > 0.0)
   {
     stream.rate = static_cast<double>(gaps.size()) / duration;
-    stream.usual_gap = quantile(gaps, 0.95);
+    stream.usual_gap = quantileOf(gaps, 0.95);
   }
 }
 

@@ -3,7 +3,7 @@
 #include "view_servo/control/clock_offset.h"
 
 #include "view_servo/geometry/planar_pose.h"
-#include "view_servo/robust/median.h"
+#include "view_servo/robust/quantile.h"
 
 #include <algorithm>
 #include <cmath>

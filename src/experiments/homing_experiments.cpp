@@ -11,6 +11,7 @@
 #include "view_servo/control/heading_hypotheses.h"
 #include "view_servo/geometry/camera.h"
 #include "view_servo/images/image_io.h"
+#include "view_servo/robust/quantile.h"
 #include "view_servo/robust/random.h"
 #include "view_servo/views/line_view_matcher.h"
 #include "view_servo/views/point_view_matcher.h"
@@ -119,12 +120,12 @@ public:
   void print(std::ostream& stream) const
   {
     stream << good_ << " of " << millimetres_.size() << " random starts end within 2 cm and 1 degree, " << arrived_
-           << " say so; distance: median " << median(millimetres_) << ", 95 % " << percentile(millimetres_, 0.95)
-           << ", largest " << percentile(millimetres_, 1.0) << " mm; yaw: median " << median(degrees_) << ", largest "
-           << percentile(degrees_, 1.0) << " degrees; time: median " << median(seconds_) << ", 95 % "
-           << percentile(seconds_, 0.95) << ", longest " << percentile(seconds_, 1.0) << " s; reversals: median "
-           << median(reversals_) << ", most " << percentile(reversals_, 1.0) << "; way: median " << median(ways_)
-           << " of the straight one; the view in sight in " << 100.0 * median(in_sight_)
+           << " say so; distance: median " << medianOf(millimetres_) << ", 95 % " << quantileOf(millimetres_, 0.95)
+           << ", largest " << quantileOf(millimetres_, 1.0) << " mm; yaw: median " << medianOf(degrees_) << ", largest "
+           << quantileOf(degrees_, 1.0) << " degrees; time: median " << medianOf(seconds_) << ", 95 % "
+           << quantileOf(seconds_, 0.95) << ", longest " << quantileOf(seconds_, 1.0) << " s; reversals: median "
+           << medianOf(reversals_) << ", most " << quantileOf(reversals_, 1.0) << "; way: median " << medianOf(ways_)
+           << " of the straight one; the view in sight in " << 100.0 * medianOf(in_sight_)
            << " % of the images in the median" << std::endl;
   }
 

@@ -10,6 +10,7 @@
 #include "view_servo/matching/assignment.h"
 #include "view_servo/matching/point_matcher.h"
 #include "view_servo/robust/multi_hypothesis.h"
+#include "view_servo/robust/quantile.h"
 
 #include <Eigen/Geometry>
 #include <Eigen/LU>
@@ -336,7 +337,7 @@ void runMultiHypothesisExperiment(const ExperimentContext& context, std::ostream
   for (std::size_t k = 0; k < all.size(); ++k)
   {
     csv << nameOf(all[k].settings.algorithm) << ',' << all[k].settings.iterations << ',' << all[k].sigma << ',' << runs
-        << ',' << mean(correct[k]) << ',' << deviation(correct[k]) << ',' << mean(wrong[k]) << ',' << median(ms[k])
+        << ',' << mean(correct[k]) << ',' << deviation(correct[k]) << ',' << mean(wrong[k]) << ',' << medianOf(ms[k])
         << ',' << large[all[k].sigma].first << ',' << large[all[k].sigma].second << '\n';
   }
 }
@@ -434,11 +435,11 @@ void runRealPairsExperiment(const ExperimentContext& context, std::ostream& csv)
       });
       csv << images.folder << '/' << images.name << ',' << (images.model == GeometryModel::FUNDAMENTAL ? "F" : "H")
           << ',' << nameOf(algorithm) << ',' << settings.iterations << ',' << runs << ',' << candidates.size() << ','
-          << most_correct << ',' << median(matches) << ',' << median(correct) << ',' << median(error) << ','
-          << median(ms) << '\n';
-      std::cerr << images.folder << '/' << images.name << ", " << nameOf(algorithm) << ": " << median(correct)
-                << " correct of " << median(matches) << ", error " << median(error) << " px, " << median(ms) << " ms"
-                << std::endl;
+          << most_correct << ',' << medianOf(matches) << ',' << medianOf(correct) << ',' << medianOf(error) << ','
+          << medianOf(ms) << '\n';
+      std::cerr << images.folder << '/' << images.name << ", " << nameOf(algorithm) << ": " << medianOf(correct)
+                << " correct of " << medianOf(matches) << ", error " << medianOf(error) << " px, " << medianOf(ms)
+                << " ms" << std::endl;
     }
   }
 }

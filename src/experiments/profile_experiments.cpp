@@ -6,6 +6,7 @@
 #include "experiments/statistics.h"
 #include "view_servo/matching/point_matcher.h"
 #include "view_servo/robust/fundamental_estimator.h"
+#include "view_servo/robust/quantile.h"
 #include "view_servo/robust/view_consistency.h"
 #include "view_servo/views/point_view_matcher.h"
 
@@ -92,7 +93,7 @@ Estimate medians(const std::vector<Estimate>& estimates)
       const double value = member(one);
       values.push_back(std::isnan(value) ? std::numeric_limits<double>::infinity() : value);
     }
-    return median(values);
+    return medianOf(values);
   };
   Estimate middle;
   middle.inliers = of([](const Estimate& one) { return one.inliers; });
@@ -300,15 +301,16 @@ void runViewConsistencyExperiment(const ExperimentContext& context, std::ostream
       csv << pair.name << ',' << (cyclic ? "cyclic" : "plain") << ',' << candidates.size() << ','
           << pair.countCorrect(candidates) << ',';
       put(medians(plain));
-      csv << medians(plain).ms << ',' << median(kept) << ',' << median(kept_correct) << ',' << median(filter_ms) << ',';
+      csv << medians(plain).ms << ',' << medianOf(kept) << ',' << medianOf(kept_correct) << ',' << medianOf(filter_ms)
+          << ',';
       put(medians(before));
       csv << medians(before).ms << ',';
       put(medians(within));
       csv << medians(within).statistics.iterations << ',' << medians(within).statistics.rejected_samples << ','
           << medians(within).ms << ',';
       put(medians(same));
-      csv << medians(same).ms << ',' << median(factors) << '\n';
-      std::cerr << pair.name << (cyclic ? ", cyclic order" : ", plain votes") << ": " << median(factors)
+      csv << medians(same).ms << ',' << medianOf(factors) << '\n';
+      std::cerr << pair.name << (cyclic ? ", cyclic order" : ", plain votes") << ": " << medianOf(factors)
                 << " times less time" << std::endl;
     }
   }

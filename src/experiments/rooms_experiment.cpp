@@ -8,6 +8,7 @@
 #include "experiments/statistics.h"
 #include "view_servo/geometry/fundamental.h"
 #include "view_servo/images/image_io.h"
+#include "view_servo/robust/quantile.h"
 #include "view_servo/views/line_view_matcher.h"
 #include "view_servo/views/point_view_matcher.h"
 #include "view_servo/views/prepared_image.h"
@@ -407,9 +408,9 @@ void runRoomsExperiment(const ExperimentContext& context, std::ostream& csv)
               << " answered, " << summary.right << " right, " << summary.wrong << " grossly wrong";
     if (!summary.errors.empty())
     {
-      std::cout << "; right ones " << median(summary.errors) << " px in the median";
+      std::cout << "; right ones " << medianOf(summary.errors) << " px in the median";
     }
-    std::cout << "; " << median(summary.ms) << " ms of processor time" << std::endl;
+    std::cout << "; " << medianOf(summary.ms) << " ms of processor time" << std::endl;
   }
 }
 

@@ -2,7 +2,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "view_servo/robust/fundamental_estimator.h"
 
-#include "view_servo/robust/median.h"
+#include "view_servo/robust/quantile.h"
 #include "view_servo/robust/random.h"
 #include "view_servo/robust/view_consistency.h"
 

@@ -5,7 +5,7 @@
 #include "patch.h"
 #include "view_servo/geometry/homography.h"
 #include "view_servo/geometry/region.h"
-#include "view_servo/robust/median.h"
+#include "view_servo/robust/quantile.h"
 
 #include <Eigen/LU>
 #include <opencv2/imgproc.hpp>

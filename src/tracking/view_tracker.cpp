@@ -4,6 +4,7 @@
 
 #include "view_servo/parameters/faults.h"
 #include "view_servo/robust/planar_motion_estimator.h"
+#include "view_servo/robust/quantile.h"
 #include "view_servo/robust/random.h"
 #include "view_servo/robust/ransac.h"
 
@@ -87,19 +88,6 @@ private:
   double scale_u_ = 1.0;
   double scale_v_ = 1.0;
 };
-
-/** The value below which that part of them lies; reorders them. */
-double quantile(std::vector<double>& values, double part)
-{
-  const auto place = values.begin() + static_cast<std::ptrdiff_t>(part * static_cast<double>(values.size()));
-  std::nth_element(values.begin(), place, values.end());
-  return *place;
-}
-
-double median(std::vector<double>& values)
-{
-  return quantile(values, 0.5);
-}
 
 /** Of where a landmark is seen, by (x, y, yaw) of the pose. */
 Eigen::Matrix<double, 2, 3> derivative(const Landmark& landmark, const PlanarPose& pose)
@@ -201,7 +189,7 @@ bool ViewTracker::start(const Correspondences& matches, const PlanarPose& pose)
   }
   ViewTracker fresh(*this);
   fresh.landmarks_.clear();
-  fresh.depths_known_ = quantile(parallaxes, QUANTILE) >= MIN_PARALLAX;
+  fresh.depths_known_ = quantileOf(parallaxes, QUANTILE) >= MIN_PARALLAX;
   fresh.extend(matches, pose);
   if (static_cast<int>(fresh.landmarks_.size()) < params_.min_supporting)
   {
@@ -285,7 +273,7 @@ ViewTracker::Result ViewTracker::fit(const std::vector<Sighting>& sightings, dou
   if (result.supporting > 0)
   {
     result.rms = std::sqrt(squares / result.supporting);
-    result.displacement = median(displacements);
+    result.displacement = medianOf(displacements);
     const double sd = std::max(result.rms, LEAST_SD);
     result.covariance = sd * sd * information.inverse();
   }
@@ -318,8 +306,7 @@ ViewTracker::Result ViewTracker::track(const cv::Mat& current, const PlanarPose&
     return result;
   }
   // Both images with things as large as in the one where they are smaller.
-  std::vector<double> sorted = ratios;
-  const double scale = std::clamp(median(sorted), 1.0 / MAX_SCALE, MAX_SCALE);
+  const double scale = std::clamp(medianOf(ratios), 1.0 / MAX_SCALE, MAX_SCALE);
   const Shrunk from_image(reference_, std::min(scale, 1.0));
   const Shrunk to_image(normalizedAgainstLight(current), std::min(1.0 / scale, 1.0));
   std::vector<cv::Point2f> from;

@@ -11,6 +11,7 @@
 #include "view_servo/PointMatches.h"
 #include "view_servo/SetView.h"
 #include "view_servo/geometry/homography.h"
+#include "view_servo/robust/quantile.h"
 #include "view_servo/ros/call_service.h"
 #include "view_servo/views/view_store.h"
 
@@ -280,7 +281,7 @@ protected:
             truth.error({ { point.reference_x, point.reference_y }, { point.current_x, point.current_y } }));
       }
     }
-    EXPECT_TRUE(errors.empty() || median(errors) < limit) << median(errors);
+    EXPECT_TRUE(errors.empty() || medianOf(errors) < limit) << medianOf(errors);
     return !errors.empty();
   }
 

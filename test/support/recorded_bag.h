@@ -20,8 +20,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstddef>
-#include <limits>
 #include <map>
 #include <string>
 #include <vector>
@@ -104,18 +102,6 @@ private:
   Eigen::Matrix3d far_away_;
   bool moved_;
 };
-
-/** NaN when there are none. */
-inline double median(std::vector<double> values)
-{
-  if (values.empty())
-  {
-    return std::numeric_limits<double>::quiet_NaN();
-  }
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
-}
 
 }  // namespace test
 }  // namespace view_servo
