@@ -162,9 +162,11 @@ public:
     Course course = law_->course();
     if (blind_)
     {
-      // Matches alone do not say how far it is.
-      course.max_speed = params_.blind_speed;
-      course.min_speed = tracker_.hasStructure() ? course.min_speed : params_.blind_speed;
+      // Matches alone do not say how far it is. The base slows down while it waits for the next ones.
+      constexpr double SLOWEST = 0.2;
+      const double left = (blindPatience() - (report_.stamp - last_trace_)) / (blindPatience() - matches_delay_);
+      course.max_speed = params_.blind_speed * std::clamp(2.0 * left, SLOWEST, 1.0);
+      course.min_speed = tracker_.hasStructure() ? course.min_speed : course.max_speed;
     }
     return course;
   }
@@ -184,6 +186,7 @@ protected:
 
   void onMatches(double stamp, const HeadingEvidence& evidence, const PlanarPose& camera_in_odom) override
   {
+    measurePace(stamp);
     hypotheses_.update(evidence.pairs, camera_in_odom);
     const bool any = !hypotheses_.list().empty();
     const PlanarPose followed = view_in_odom_ ? compose(inverse(camera_in_odom), *view_in_odom_)
@@ -240,7 +243,7 @@ protected:
       return;
     }
     const PlanarPose camera = compose(*base, target_.mount.on_base);
-    tracked_ = false;
+    tracked_ = report_.tracked = false;
     if (tracker_.hasStructure() && view_in_odom_)
     {
       const PlanarPose predicted = compose(inverse(camera), *view_in_odom_);
@@ -248,7 +251,7 @@ protected:
           tracker_.track(grey, { predicted.x / scale_, predicted.y / scale_, predicted.yaw });
       if (result.found)
       {
-        tracked_ = true;
+        tracked_ = report_.tracked = true;
         correctScale(camera, result.pose);
         report_.inliers = result.supporting;
         report_.confidence = static_cast<double>(result.supporting) / result.looked_for;
@@ -311,6 +314,26 @@ private:
     last_trace_ = std::max(stamp, last_trace_);
     blind_to_ = *odometry_.newest();
     blind_distance_ = blind_turn_ = 0.0;
+  }
+
+  /** @param stamp of the image in which matches have been found. */
+  void measurePace(double stamp)
+  {
+    constexpr double WEIGHT = 0.3;
+    constexpr double LONGEST = 0.5;  // [s]
+    if (stamp > newest_matches_)
+    {
+      matches_period_ += WEIGHT * (std::min(stamp - newest_matches_, LONGEST) - matches_period_);
+    }
+    matches_delay_ += WEIGHT * (std::clamp(report_.stamp - stamp, 0.0, LONGEST) - matches_delay_);
+    newest_matches_ = std::fmax(newest_matches_, stamp);
+  }
+
+  /** How old the last matches' image may be while the base goes on by them: three periods of their rate after they are due [s]. */
+  double blindPatience() const
+  {
+    constexpr double LEAST = 0.4;
+    return matches_delay_ + std::max(3.0 * matches_period_, LEAST);
   }
 
   /** A base that cannot slide stands to look: what is seen from one place is averaged. @param view in odometry's frame. */
@@ -441,7 +464,6 @@ private:
   /** State, arrival and loss after an image. */
   void judge(double stamp, const PlanarPose& base)
   {
-    constexpr double COAST = 0.5;          // matches are older than the image when they come [s]
     constexpr double LONGEST_BLIND = 3.0;  // that a base goes on by odometry [s]
     if (!view_in_odom_)
     {
@@ -467,7 +489,7 @@ private:
       setState(HomingState::FAILED, law_->text());
       return;
     }
-    if (blank || unseen > (mayGoOn() ? LONGEST_BLIND : blind_ ? COAST : 0.0))
+    if (blank || unseen > (mayGoOn() ? LONGEST_BLIND : blind_ ? blindPatience() : 0.0))
     {
       within_since_ = NOT_A_NUMBER;
       giveUpAfter(stamp, last_trace_, "the view was lost", HomingState::LOST,
@@ -584,6 +606,9 @@ private:
   double blind_turn_ = 0.0;      // [rad]
   double within_since_ = NOT_A_NUMBER;
   int contradictions_ = 0;
+  double newest_matches_ = NOT_A_NUMBER;  // stamp of the newest image with matches
+  double matches_period_ = 0.2;           // between the images with matches, in the mean of late [s]
+  double matches_delay_ = 0.1;            // until their matches come, in the mean of late [s]
 };
 
 /** The parameters that no part of homing has by itself. */

@@ -46,7 +46,6 @@ namespace view_servo
  *    for a while after each end, then nothing;
  *  - `heading` (view_servo/Heading): for each image; `heading_arrow` (geometry_msgs/PoseStamped): the same for rviz, at
  *    the base, its x axis towards the view, while there is a heading. `view_pose` (geometry_msgs/PoseWithCovarianceStamped).
- *
  * Action: `home` (view_servo/HomeToView).
  *
  * A thread of the driver's own works on images and matches, and leaves a Course; every cycle of control follows it by the
@@ -91,6 +90,7 @@ public:
           [this](const std::string& problem) { context_.locked([&] { images_.reject(problem); }); })
   {
     images_.setMaxAge(params.camera.max_image_age);
+    matches_.followPace(3.0);
     context.diagnostics().add("camera", &camera_, &CameraInput::diagnose);
     want(params_.view, "");
     context.listen<PointMatches>("point_matches", 1, [this](const PointMatches::ConstPtr& m) {
@@ -185,8 +185,8 @@ public:
   std::optional<double> takeLatency()
   {
     const std::optional<Clock::time_point> time = std::exchange(unanswered_, std::nullopt);
-    return time ? std::optional<double>(1e3 * std::chrono::duration<double>(Clock::now() - *time).count())
-                : std::nullopt;
+    using Milliseconds = std::chrono::duration<double, std::milli>;
+    return time ? std::make_optional(Milliseconds(Clock::now() - *time).count()) : std::nullopt;
   }
 
   // ----------------------------------------------------------------------------------------------------- messages
@@ -239,6 +239,7 @@ private:
     course_ = Course();
     unanswered_.reset();
     odd_stamps_ = 0;
+    matches_.setNeeded(true);
     motion_.clear();
     worker_.setTask(task_);
   }
@@ -345,6 +346,7 @@ private:
     }
     report_ = outcome.report;
     course_ = outcome.course;
+    matches_.setNeeded(!report_.tracked || !matches_.problem().empty());
     odometry_.setRemainingDelay(report_.odometry_delay);
     if (const std::string advice = odometry_.adviceOnDelay(); !advice.empty())
     {
@@ -412,11 +414,9 @@ private:
   MotionWatch motion_;
   double travelled_ = 0.0;
   int odd_stamps_ = 0;
-  std::optional<Clock::time_point>
-      unanswered_;  // when an image came that was worked on, and no command has followed yet
+  std::optional<Clock::time_point> unanswered_;  // when an image came that was worked on, until a command follows
 
   Clock::time_point next_watch_;  // the worker's thread's alone
-
   HomingWorker worker_;
   CameraInput camera_;
 };

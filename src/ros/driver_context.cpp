@@ -52,11 +52,11 @@ DriverInput::Stamp DriverInput::checkStamp(const ros::Time& stamp)
 
 std::string DriverInput::missing() const
 {
-  if (!needed_ || !watch_.stale())
+  if (!needed_ || age() <= timeout())
   {
     return "";
   }
-  return problem_.empty() ? "no " + what_ + " for " + seconds(watch_.timeout()) + " on " + topics_ : problem_;
+  return problem_.empty() ? "no " + what_ + " for " + seconds(timeout()) + " on " + topics_ : problem_;
 }
 
 std::string stampsApart(const DriverInput& odometry, const DriverInput& images)

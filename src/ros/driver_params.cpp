@@ -26,7 +26,9 @@ std::vector<Parameter> rowsOfHomingDriver(HomingDriverParams& params)
     real("odometry_delay", params.odometry_delay, "s", "[-2, 2]",
          "how much later than images of the same moment odometry is stamped: it is taken away from odometry's stamps"),
     real("match_timeout", params.match_timeout, "s", "> 0",
-         "the base stands when neither kind of matches has come for so long, though it needs them"),
+         "while the view's points are not tracked, the base stands when neither kind of matches has come for so long, "
+         "or "
+         "for three times their usual period where this is longer"),
   };
 }
 

@@ -159,15 +159,15 @@ TYPED_TEST_P(DriverCases, GivesUpInTime)
 TYPED_TEST_P(DriverCases, StopsWhenThePeerFallsSilentAndGoesOnWithIt)
 {
   this->drive();
-  this->expectToStop([this] { this->robot_.answers = false; }, ServoStatus::LOST, TypeParam::SILENT);
-  this->robot_.answers = true;
+  this->expectToStop([this] { this->robot_.hush(true); }, ServoStatus::LOST, TypeParam::SILENT);
+  this->robot_.hush(false);
   this->expectToGoOn();
 }
 
 TYPED_TEST_P(DriverCases, GivesUpWhenThePeerStaysSilent)
 {
   this->drive();
-  this->robot_.answers = false;
+  this->robot_.hush(true);
   const auto final = this->result();
   EXPECT_FALSE(final.success);
   EXPECT_NE(final.message.find(TypeParam::SILENT), std::string::npos) << final.message;

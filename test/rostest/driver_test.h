@@ -76,6 +76,12 @@ public:
     return wanted_;
   }
 
+  /** What the driver follows the view by does not come any more, or comes again. */
+  virtual void hush(bool silent)
+  {
+    answers = !silent;
+  }
+
   /** What the robot is told. By default it stands still, whatever that is. */
   template <typename Message>
   void obey(const CommandsOf<Message>& /*commands*/)

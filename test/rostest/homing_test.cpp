@@ -18,6 +18,8 @@
 #include <geometry_msgs/Twist.h>
 #include <tf2_ros/static_transform_broadcaster.h>
 
+#include <atomic>
+#include <chrono>
 #include <cmath>
 
 namespace view_servo
@@ -94,6 +96,13 @@ public:
   {
     const std::lock_guard<std::mutex> lock(publisher_mutex_);
     commands_ = &commands;
+  }
+
+  /** No matches come, nor are the view's points to be seen: one of both would do. */
+  void hush(bool silent) override
+  {
+    FakeRobot::hush(silent);
+    elsewhere_ = silent;
   }
 
   /** The matcher goes, with all its connections, and comes back. */
@@ -197,7 +206,11 @@ private:
     info.header.frame_id = camera_frame_;
     if (camera)
     {
-      const cv::Mat image = black ? cv::Mat(scene().image.size(), CV_8UC1, cv::Scalar(0)) : scene().image;
+      cv::Mat image = black ? cv::Mat(scene().image.size(), CV_8UC1, cv::Scalar(0)) : scene().image;
+      if (elsewhere_)
+      {
+        image = texturedPicture(7, image.size());
+      }
       images_.publish(toImage(image, sensor_msgs::image_encodings::MONO8, info.header));
       if (infos)
       {
@@ -241,7 +254,8 @@ private:
 
   std::mutex publisher_mutex_;
   const CommandsOf<Command>* commands_ = nullptr;
-  PlanarPose base_ = scene().base;  // by odometry
+  PlanarPose base_ = scene().base;        // by odometry
+  std::atomic<bool> elsewhere_{ false };  // the camera sees something else
   std::string odometry_child_ = sim::BASE_FRAME;
   std::string camera_frame_ = sim::CAMERA_FRAME;
   ros::Publisher images_;
@@ -414,6 +428,16 @@ TEST_F(HomingTest, StopsWhenTheImageTurnsBlackAndGoesOnAfterwards)
   expectToStop([this] { robot_.black = true; }, ServoStatus::LOST, "shows nothing");
   robot_.black = false;
   expectToGoOn();
+}
+
+TEST_F(HomingTest, NeedsNoMatchesWhileThePointsAreTracked)
+{
+  drive();
+  ASSERT_TRUE(waitUntil([this] { return reason().find("points are") != std::string::npos; })) << reason();
+  robot_.answers = false;
+  const auto silent = std::chrono::steady_clock::now();
+  EXPECT_TRUE(waitUntil([&] { return commands_.lastMotionAfter(silent) > 2.0; })) << reason();
+  EXPECT_EQ(status_.last()->state, ServoStatus::SERVOING) << reason();
 }
 
 TEST_F(HomingTest, StopsForMatchesOfAnotherView)

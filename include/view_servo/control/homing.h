@@ -103,7 +103,8 @@ struct HomingReport
    * [px].
    */
   double displacement = std::numeric_limits<double>::quiet_NaN();
-  int inliers = 0;  ///< number of matches or points that agree; mode THESIS: of all matches
+  bool tracked = false;  ///< the view's points were found in the last image; without, the way is known by matches alone
+  int inliers = 0;       ///< number of matches or points that agree; mode THESIS: of all matches
   /** The base's pose at the view, in odometry's frame; empty until its distance is known in metres, and when it is lost. */
   std::optional<PlanarPose> goal_in_odom;
   Eigen::Matrix3d goal_covariance = Eigen::Matrix3d::Zero();  ///< of its (x, y, yaw) [m, rad]

@@ -39,6 +39,9 @@ public:
   /** To be called when something has come that can be used. */
   void accept()
   {
+    constexpr double WEIGHT = 0.3;
+    constexpr double LONGEST = 0.5;  // [s]
+    period_ += WEIGHT * (std::min(watch_.age(), LONGEST) - period_);
     watch_.feed();
     problem_.clear();
     came_ = true;
@@ -46,7 +49,7 @@ public:
   /** Whether something that can be used has come, and not too long ago. */
   bool fresh() const
   {
-    return came_ && !watch_.stale();
+    return came_ && watch_.age() <= timeout();
   }
   /** To be called when something has come that cannot be used. @param problem why, in one line. */
   void reject(const std::string& problem)
@@ -86,6 +89,18 @@ public:
     needed_ = needed;
   }
 
+  /** Sets how many periods of the input's rate may pass without one, where this is longer than the timeout: at most 0.5 s each. */
+  void followPace(double periods)
+  {
+    periods_ = periods;
+  }
+
+  /** Time without input after which it is missing [s]. */
+  double timeout() const
+  {
+    return std::max(watch_.timeout(), periods_ * period_);
+  }
+
   /** Sets by how much stamps may differ from ROS' time, in the past or in the future [s]; without a call 600 s ahead. */
   void setMaxAge(double age)
   {
@@ -122,6 +137,8 @@ private:
   std::string jump_;
   StampOrder order_;
   double max_age_ = std::numeric_limits<double>::infinity();
+  double periods_ = 0.0;
+  double period_ = 0.0;  // between inputs, in the mean of late [s]
   bool came_ = false;
   bool needed_ = true;
 };

@@ -42,7 +42,11 @@ struct HomingDriverParams
   double image_timeout = 0.25;           ///< the base is stopped when no image has come for this time [s]
   double odometry_timeout = 0.25;        ///< the base is stopped when no odometry has come for this time [s]
   double odometry_delay = 0.0;           ///< odometry's stamps are later than images' of the same moment by this [s]
-  double match_timeout = 0.25;  ///< before it follows points, the base is stopped without matches for this time [s]
+  /**
+   * While the view's points are not tracked, the base is stopped without matches for this time, or for three of their
+   * periods where these are longer [s].
+   */
+  double match_timeout = 0.25;
   HomingParams homing;
   VelocityLimits limits;
 
