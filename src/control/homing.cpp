@@ -151,6 +151,40 @@ public:
       tracker_(target.image, target.camera, target.mount, params.tracker),
       law_(makeApproachLaw(params.approach, params.arrival_distance))
   {
+    std::vector<ViewTracker::Point> points;
+    for (const StructurePoint& point : target.structure.points)
+    {
+      const Eigen::Vector2d level = target.mount.level(target.view_camera.normalized(point.pixel));
+      points.push_back({ { level, point.inverse_depth }, point.information, point.pixel });
+    }
+    if (tracker_.restore(points))
+    {
+      scale_corrections_ = ENOUGH_CORRECTIONS;
+    }
+  }
+
+  ViewStructure structure() const override
+  {
+    constexpr double FADING = 0.25;  // of the information of points that are not seen at the view
+    constexpr double LEAST = 0.01;   // information that is worth to be kept [m^2]
+    ViewStructure result;
+    if (!isMetric())
+    {
+      return result;
+    }
+    for (const ViewTracker::Point& point : tracker_.points())
+    {
+      const bool seen =
+          std::find(supporters_.begin(), supporters_.end(), point.landmark.reference) != supporters_.end();
+      const double information = scale_ * scale_ * point.information * (seen || !report_.at_view ? 1.0 : FADING);
+      const Eigen::Vector2d pixel =
+          target_.view_camera.project(target_.mount.unlevel(point.landmark.reference).homogeneous());
+      if (information >= LEAST && pixel.allFinite())
+      {
+        result.points.push_back({ pixel, point.landmark.inverse_depth / scale_, information });
+      }
+    }
+    return result;
   }
 
   Course course() const override
@@ -195,6 +229,10 @@ protected:
     if (ended() || !any)
     {
       return;
+    }
+    if (!view_in_odom_ && tracker_.hasStructure() && locate(stamp, evidence.pairs, camera_in_odom))
+    {
+      return;  // by what was learnt of the view before
     }
     const HeadingHypothesis& best = hypotheses_.list().front();
     if (best.updates < MIN_UPDATES || best.support.empty())
@@ -265,6 +303,7 @@ protected:
         const PlanarPose view = compose(camera, { scale_ * result.pose.x, scale_ * result.pose.y, result.pose.yaw });
         follow(stamp, averageAtRest(*base, view));
         view_covariance_ = inOdometry(result, camera.yaw);
+        supporters_ = result.supporters;
       }
     }
     if (view_in_odom_)
@@ -278,6 +317,7 @@ protected:
 private:
   static constexpr std::size_t ENOUGH_SUPPORT = 40;  // matches that structure is made from
   static constexpr double CLOCKS_PERIOD = 0.5;       // between two estimates of their offset, which take a while [s]
+  static constexpr int ENOUGH_CORRECTIONS = 10;      // of the scale, each by a fifth, until it is that of metres
   static constexpr int MIN_UPDATES = 2;              // sets of matches that agree before a hypothesis is followed
 
   /** The base's pose at the view, in odometry's frame. */
@@ -334,6 +374,12 @@ private:
   {
     constexpr double LEAST = 0.4;
     return matches_delay_ + std::max(3.0 * matches_period_, LEAST);
+  }
+
+  /** Whether the view's points are tracked, and their depths are known in metres. */
+  bool isMetric() const
+  {
+    return tracked_ && tracker_.depthsKnown() && scale_corrections_ >= ENOUGH_CORRECTIONS;
   }
 
   /** A base that cannot slide stands to look: what is seen from one place is averaged. @param view in odometry's frame. */
@@ -509,7 +555,6 @@ private:
   PlanarPose reportGoal(const PlanarPose& base)
   {
     constexpr double POSITION_DOUBT = 0.05;  // of where the view is, for the region of interest [m]
-    constexpr int ENOUGH_CORRECTIONS = 10;   // of the scale, each by a fifth, until it is that of metres
     const PlanarPose goal = goalInBase(base);
     report_.heading = goal.heading();
     report_.yaw_error = goal.yaw;
@@ -521,7 +566,7 @@ private:
 
     report_.manoeuvre = law_->text();
     report_.goal_in_odom.reset();
-    if (tracked_ && tracker_.depthsKnown() && scale_corrections_ >= ENOUGH_CORRECTIONS)
+    if (isMetric())
     {
       report_.goal_in_odom = goalInOdom();
       report_.goal_covariance = view_covariance_;
@@ -606,9 +651,10 @@ private:
   double blind_turn_ = 0.0;      // [rad]
   double within_since_ = NOT_A_NUMBER;
   int contradictions_ = 0;
-  double newest_matches_ = NOT_A_NUMBER;  // stamp of the newest image with matches
-  double matches_period_ = 0.2;           // between the images with matches, in the mean of late [s]
-  double matches_delay_ = 0.1;            // until their matches come, in the mean of late [s]
+  std::vector<Eigen::Vector2d> supporters_;  // in the last image in which the points were found
+  double newest_matches_ = NOT_A_NUMBER;     // stamp of the newest image with matches
+  double matches_period_ = 0.2;              // between the images with matches, in the mean of late [s]
+  double matches_delay_ = 0.1;               // until their matches come, in the mean of late [s]
 };
 
 /** The parameters that no part of homing has by itself. */

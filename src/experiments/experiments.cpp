@@ -18,6 +18,7 @@
 #include "experiments/lines_table.h"
 #include "experiments/profile_experiments.h"
 #include "experiments/rooms_experiment.h"
+#include "experiments/structure_experiment.h"
 #include "tools/command_line.h"
 #include "view_servo/parameters/error_text.h"
 
@@ -64,6 +65,8 @@ const std::vector<Experiment>& experiments()
     { "homing", "chapter 5: homing in simulated rooms, from many starts", false, HOMING_STARTS, runHomingExperiment },
     { "homing_differential", "the same for a base that cannot slide", false, HOMING_STARTS,
       runHomingDifferentialExperiment },
+    { "homing_structure", "homing with what was learnt of the view in an earlier run, and without", false,
+      STRUCTURE_STARTS, runStructureExperiment },
     { "arm", "table 8.1: servoing of a simulated arm, from many starts", false, ARM_RUNS, runArmExperiment },
     { "homing_directions", "the heading between real views of a room", true, DIRECTION_DRAWS, runDirectionsExperiment },
     { "multi_hypothesis", "table 9.1, figures 9.1 to 9.6: several hypotheses a point, simulated", false,

@@ -80,6 +80,7 @@ public:
           context.resolved("image_raw"),
           [this](const HomingOutcome& outcome) {
             context_.runLocked("the outcome of an image", [&] { onOutcome(outcome); });
+            storeStructure(store_, outcome);
           },
           [this](const CameraFrame& frame) { watchView(frame); }),
       camera_(
@@ -113,7 +114,7 @@ public:
     {
       throw std::invalid_argument("the goal names no view, and ~view is not set");
     }
-    const StoredView stored = store_.load(view);
+    const LearntView stored = loadLearntView(store_, view);
     context_.locked([&] { want(view, context_.goalId()); });
     context_.requestView(view);
     // Only an image that has come since: the camera may be another than it was.
@@ -184,8 +185,8 @@ public:
 
   std::optional<double> takeLatency()
   {
-    const std::optional<Clock::time_point> time = std::exchange(unanswered_, std::nullopt);
     using Milliseconds = std::chrono::duration<double, std::milli>;
+    const std::optional<Clock::time_point> time = std::exchange(unanswered_, std::nullopt);
     return time ? std::make_optional(Milliseconds(Clock::now() - *time).count()) : std::nullopt;
   }
 
@@ -256,7 +257,7 @@ private:
     return odometry.problem().empty() ? "no odometry has come on " + odometry.topics() : odometry.problem();
   }
 
-  std::shared_ptr<HomingTask> makeTask(const StoredView& stored, const CameraFrame& frame,
+  std::shared_ptr<HomingTask> makeTask(const LearntView& stored, const CameraFrame& frame,
                                        const HomingParams& params) const
   {
     const CameraMount mount(
@@ -324,6 +325,7 @@ private:
     {
       const std::string& other = points_.otherView().empty() ? lines_.otherView() : points_.otherView();
       matches_.reject(other.empty() ? points_.refusal() + lines_.refusal() : other);
+      matches_.setNeeded(true);
       return;
     }
     matches_.accept();
@@ -377,7 +379,7 @@ private:
     next_watch_ = Clock::now() + PERIOD;
     try
     {
-      const std::shared_ptr<HomingTask> task = makeTask(store_.load(params_.view), frame, params_.homing);
+      const std::shared_ptr<HomingTask> task = makeTask(loadLearntView(store_, params_.view), frame, params_.homing);
       context_.runLocked("the watch for a view", [&] {
         if (!task_ && context_.goalId().empty())
         {

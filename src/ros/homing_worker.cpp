@@ -2,21 +2,64 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "view_servo/ros/homing_worker.h"
 
+#include "view_servo/parameters/error_text.h"
 #include "view_servo/ros/conversions.h"
+
+#include <ros/console.h>
 
 #include <cstddef>
 
 namespace view_servo
 {
-std::shared_ptr<HomingTask> makeHomingTask(const StoredView& stored, const sensor_msgs::CameraInfoConstPtr& info,
+std::shared_ptr<HomingTask> makeHomingTask(const LearntView& stored, const sensor_msgs::CameraInfoConstPtr& info,
                                            const CameraMount& mount, const HomingParams& params)
 {
   HomingTarget target;
-  target.image = stored.image;
+  target.image = stored.view.image;
   target.camera = toCamera(*info);
-  target.view_camera = cameraOf(stored, target.camera);
+  target.view_camera = cameraOf(stored.view, target.camera);
   target.mount = mount;
-  return std::make_shared<HomingTask>(HomingTask{ stored.name, info, makeHoming(params, target) });
+  target.structure = stored.structure;
+  return std::make_shared<HomingTask>(
+      HomingTask{ stored.view.name, stored.revision, info, makeHoming(params, target), false });
+}
+
+LearntView loadLearntView(const ViewStore& store, const std::string& name)
+{
+  LearntView result;
+  result.revision = store.revision(name);
+  result.view = store.load(name);
+  try
+  {
+    result.structure = store.loadStructure(name);
+  }
+  catch (const ViewStoreError& error)
+  {
+    ROS_WARN_STREAM(oneLine(error) << "; it is learnt anew");
+  }
+  return result;
+}
+
+void storeStructure(const ViewStore& store, const HomingOutcome& outcome)
+{
+  HomingTask& task = *outcome.task;
+  if (outcome.report.state != HomingState::ARRIVED || task.structure_stored)
+  {
+    return;
+  }
+  task.structure_stored = true;
+  const ViewStructure structure = task.homing->structure();
+  try
+  {
+    if (!structure.points.empty() && store.saveStructure(task.view, task.revision, structure))
+    {
+      ROS_INFO_STREAM("view '" << task.view << "': the depths of " << structure.points.size() << " points are stored");
+    }
+  }
+  catch (const ViewStoreError& error)
+  {
+    ROS_WARN_STREAM(oneLine(error));
+  }
 }
 
 HomingWorker::HomingWorker(std::string image_topic, std::function<void(const HomingOutcome&)> on_outcome,

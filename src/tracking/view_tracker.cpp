@@ -200,6 +200,26 @@ bool ViewTracker::start(const Correspondences& matches, const PlanarPose& pose)
   return true;
 }
 
+bool ViewTracker::restore(const std::vector<Point>& points)
+{
+  std::vector<Point> inside;
+  for (Point point : points)
+  {
+    point.pixel = pixelOf(point.landmark.reference);
+    if (insideReference(point.pixel) && static_cast<int>(inside.size()) < params_.max_landmarks)
+    {
+      inside.push_back(point);
+    }
+  }
+  if (static_cast<int>(inside.size()) < params_.min_supporting)
+  {
+    return false;
+  }
+  landmarks_ = std::move(inside);
+  depths_known_ = true;
+  return true;
+}
+
 void ViewTracker::extend(const Correspondences& matches, const PlanarPose& pose)
 {
   constexpr double MIN_INFORMATION = 1e-4;  // squared motion in the image for a unit of inverse depth
@@ -264,6 +284,7 @@ ViewTracker::Result ViewTracker::fit(const std::vector<Sighting>& sightings, dou
     if (residual <= max_residual)
     {
       ++result.supporting;
+      result.supporters.push_back(sighting.landmark.reference);
       squares += residual * residual;
       displacements.push_back(focal * (sighting.current - sighting.landmark.reference).norm());
       const Eigen::Matrix<double, 2, 3> jacobian = focal * derivative(sighting.landmark, result.pose);

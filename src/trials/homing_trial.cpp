@@ -164,6 +164,7 @@ public:
     target.image = parts.reference->grey();
     target.camera = target.view_camera = withFocalLengthError(world.camera, params.conditions.focal_length_error);
     target.mount = CameraMount(world.camera_on_base);
+    target.structure = params.structure;
     return target;
   }
 
@@ -290,6 +291,7 @@ private:
     outcome.travelled = travelled_;
     outcome.reversals = reversals_;
     outcome.in_sight = images_since_found_ > 0 ? static_cast<double>(images_in_sight_) / images_since_found_ : 0.0;
+    outcome.structure = homing_->structure();
     return outcome;
   }
 

@@ -36,6 +36,7 @@ struct HomingTrialParams
   HomingParams homing;
   VelocityLimits limits;
   HomingConditions conditions;
+  ViewStructure structure;  ///< what is known of the view beforehand; without points: nothing
   bool use_points = true;
   bool use_lines = true;
   bool line_pairs = false;      ///< groups of lines are pairs instead of triplets
@@ -67,6 +68,7 @@ struct HomingOutcome
   double travelled = 0.0;       ///< length of the true path [m]
   int reversals = 0;            ///< how often the base changed between driving ahead and back
   double in_sight = 0.0;        ///< share of the images in which the view was found, once it had been found
+  ViewStructure structure;      ///< what homing has learnt of the view
 };
 
 /**

@@ -66,6 +66,13 @@ fs::path yamlPath(const fs::path& directory, const std::string& name)
   return directory / (name + ".yaml");
 }
 
+constexpr const char* STRUCTURE_ENDING = ".points";
+
+fs::path structurePath(const fs::path& directory, const std::string& name, const std::string& revision)
+{
+  return directory / (name + "." + revision + STRUCTURE_ENDING);
+}
+
 std::string imageFileName(const std::string& name, std::string_view png)
 {
   return name + "." + checksum(png) + ".png";
@@ -211,8 +218,10 @@ bool isFileOf(const std::string& name, std::string file)
     }
   }
   const std::string prefix = name + ".";
-  return file.size() == prefix.size() + DIGITS + 4 && file.compare(0, prefix.size(), prefix) == 0 &&
-         ends_with(".png") && file.find_first_not_of("0123456789abcdef", prefix.size()) == prefix.size() + DIGITS;
+  return file.compare(0, prefix.size(), prefix) == 0 &&
+         file.find_first_not_of("0123456789abcdef", prefix.size()) == prefix.size() + DIGITS &&
+         (file.compare(prefix.size() + DIGITS, file.npos, ".png") == 0 ||
+          file.compare(prefix.size() + DIGITS, file.npos, STRUCTURE_ENDING) == 0);
 }
 
 /** Removes the files of a view that its yaml file, if there is one, does not need. */
@@ -338,6 +347,11 @@ ViewPose poseFromYaml(const YAML::Node& node)
   return pose;
 }
 
+std::string withChecksum(const std::string& text)
+{
+  return text + std::string(CHECKSUM_KEY) + checksum(text) + "\n";
+}
+
 /** All of a view but its pixels. */
 std::string toYamlText(const StoredView& view, const std::string& image_file)
 {
@@ -361,20 +375,24 @@ std::string toYamlText(const StoredView& view, const std::string& image_file)
     emit(yaml, *view.pose);
   }
   yaml << YAML::EndMap << YAML::Newline;
-  const std::string text(yaml.c_str(), yaml.size());
-  return text + std::string(CHECKSUM_KEY) + checksum(text) + "\n";
+  return withChecksum(std::string(yaml.c_str(), yaml.size()));
+}
+
+/** The text before the last line. @throws Damage when that is not, to the byte, what withChecksum() wrote. */
+std::string withoutChecksum(const std::string& text, const std::string& what)
+{
+  const std::size_t end = text.rfind(CHECKSUM_KEY);
+  if (end == std::string::npos || text != withChecksum(text.substr(0, end)))
+  {
+    throw Damage(what + " does not agree with the checksum in its last line");
+  }
+  return text.substr(0, end);
 }
 
 /** @throws Damage when the text is not, to the byte, what toYamlText() wrote. */
 YAML::Node parseYaml(const std::string& text)
 {
-  const std::size_t end = text.rfind(CHECKSUM_KEY);
-  if (end == std::string::npos ||
-      text.substr(end) != std::string(CHECKSUM_KEY) + checksum(std::string_view(text).substr(0, end)) + "\n")
-  {
-    throw Damage("its yaml file does not agree with the checksum in its last line");
-  }
-  const YAML::Node node = YAML::Load(text);
+  const YAML::Node node = YAML::Load(withoutChecksum(text, "its yaml file"));
   if (const int format = node["format"].as<int>(); format != FORMAT)
   {
     throw Damage("it has format " + std::to_string(format) + ", not " + std::to_string(FORMAT));
@@ -552,6 +570,45 @@ std::string ViewStore::revision(const std::string& name) const
     fail("load", name, error.what());
   }
   fail("load", name, "there is none of that name");
+}
+
+bool ViewStore::saveStructure(const std::string& name, const std::string& revision,
+                              const ViewStructure& structure) const
+{
+  requireValidName("save the structure of", name);
+  try
+  {
+    if (fs::exists(yamlPath(directory_, name)))
+    {
+      const DirectoryLock lock(directory_);
+      if (this->revision(name) != revision)
+      {
+        return false;
+      }
+      replaceFile(structurePath(directory_, name, revision), withChecksum(toText(structure)));
+      syncDirectory(directory_);
+      return true;
+    }
+  }
+  catch (const std::exception& error)
+  {
+    fail("save the structure of", name, error.what());
+  }
+  fail("save the structure of", name, "there is none of that name");
+}
+
+ViewStructure ViewStore::loadStructure(const std::string& name) const
+{
+  const fs::path path = structurePath(directory_, name, revision(name));
+  try
+  {
+    const std::optional<std::string> text = readFile(path);
+    return text ? structureFromText(withoutChecksum(*text, path.filename().string())) : ViewStructure();
+  }
+  catch (const std::exception& error)
+  {
+    fail("load the structure of", name, error.what());
+  }
 }
 
 ViewStore::Listing ViewStore::list() const

@@ -71,7 +71,7 @@ TEST(Experiments, RefusesRunsWhereNothingIsRepeated)
     expectContains(outcome.err, "--runs: " + name + " repeats nothing");
     expectContains(
         outcome.err,
-        "homing, homing_differential, arm, multi_hypothesis, real_pairs, profiles_parameters, view_consistency, "
+        "homing, homing_differential, homing_structure, arm, multi_hypothesis, real_pairs, profiles_parameters, view_consistency, "
         "false_answers, cyclic_order do");
   }
 }

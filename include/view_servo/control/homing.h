@@ -15,6 +15,7 @@
 #include "view_servo/geometry/planar_pose.h"
 #include "view_servo/parameters/parameter.h"
 #include "view_servo/tracking/view_tracker.h"
+#include "view_servo/views/view_structure.h"
 
 #include <Eigen/Core>
 #include <opencv2/core/mat.hpp>
@@ -118,10 +119,11 @@ Progress toProgress(const HomingReport& report);
 /** What homing goes back to. */
 struct HomingTarget
 {
-  cv::Mat image;       ///< the stored view; 8-bit, one channel
-  Camera camera;       ///< calibration of the current images; it has no fault
-  Camera view_camera;  ///< calibration of `image`; it has no fault
-  CameraMount mount;   ///< where the camera is on the base
+  cv::Mat image;            ///< the stored view; 8-bit, one channel
+  Camera camera;            ///< calibration of the current images; it has no fault
+  Camera view_camera;       ///< calibration of `image`; it has no fault
+  CameraMount mount;        ///< where the camera is on the base
+  ViewStructure structure;  ///< what has been learnt of the view, see Homing::structure(); without points: nothing
 };
 
 /**
@@ -162,6 +164,16 @@ public:
   {
     const std::optional<PlanarPose> base = odometry_.newest();
     return base ? along(course(), *base) : BaseVelocity(BaseVelocity::Zero());
+  }
+
+  /**
+   * What is known of where the things are that the view shows, to be stored with it: once the view's points are tracked
+   * and the distance is known in metres, else without points. Points of an earlier structure that are not seen any more
+   * where the base has arrived count less from one time to the next, and are forgotten after the third.
+   */
+  virtual ViewStructure structure() const
+  {
+    return {};
   }
 
   const HomingReport& report() const

@@ -95,10 +95,10 @@ public:
     periods_ = periods;
   }
 
-  /** Time without input after which it is missing [s]. */
+  /** Time without input after which it is missing; that of followPace() only while nothing is wrong with what comes [s]. */
   double timeout() const
   {
-    return std::max(watch_.timeout(), periods_ * period_);
+    return problem_.empty() ? std::max(watch_.timeout(), periods_ * period_) : watch_.timeout();
   }
 
   /** Sets by how much stamps may differ from ROS' time, in the past or in the future [s]; without a call 600 s ahead. */

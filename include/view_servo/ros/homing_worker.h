@@ -21,19 +21,32 @@
 
 namespace view_servo
 {
+/** A stored view with what has been learnt of it. */
+struct LearntView
+{
+  StoredView view;
+  std::string revision;     ///< ViewStore::revision() of `view`
+  ViewStructure structure;  ///< without points: nothing has been learnt
+};
+
+/** What has been learnt, but is damaged, is left out with a warning. @throws ViewStoreError as ViewStore::load(). */
+LearntView loadLearntView(const ViewStore& store, const std::string& name);
+
 /** Homing to a view: for a goal, or without one, to estimate the view's direction only. */
 struct HomingTask
 {
   std::string view;                      ///< name of the stored view
+  std::string revision;                  ///< ViewStore::revision() of it
   sensor_msgs::CameraInfoConstPtr info;  ///< calibration that `homing` was made with
   std::unique_ptr<Homing> homing;        ///< only the worker's thread uses it
+  bool structure_stored = false;         ///< by storeStructure()
 };
 
 /**
  * @param info calibration of the images that homing will get. @param mount where their camera is on the base.
  * @throws std::invalid_argument saying why homing to this view by such images cannot be.
  */
-std::shared_ptr<HomingTask> makeHomingTask(const StoredView& stored, const sensor_msgs::CameraInfoConstPtr& info,
+std::shared_ptr<HomingTask> makeHomingTask(const LearntView& stored, const sensor_msgs::CameraInfoConstPtr& info,
                                            const CameraMount& mount, const HomingParams& params);
 
 /** The result of the images and matches that the worker took together. */
@@ -45,6 +58,12 @@ struct HomingOutcome
   std::optional<std::chrono::steady_clock::time_point> frame_time;  ///< when the image came; empty: none
   std::string fault;  ///< why the inputs could not be used; empty: they could
 };
+
+/**
+ * Stores, once, what a task has learnt of its view when the base has arrived; that this failed is a warning. Takes as long
+ * as a disk does: only for the worker's thread.
+ */
+void storeStructure(const ViewStore& store, const HomingOutcome& outcome);
 
 /**
  * Works on images, matches and odometry for one task at a time, in a thread of its own because an image takes longer

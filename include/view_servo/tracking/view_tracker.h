@@ -59,6 +59,19 @@ public:
   ViewTracker(const cv::Mat& reference, const Camera& camera, const CameraMount& mount,
               const ViewTrackerParams& params);
 
+  /** A point of the stored view that is tracked. */
+  struct Point
+  {
+    Landmark landmark;
+    double information = 0.0;                         ///< of the inverse depth
+    Eigen::Vector2d pixel = Eigen::Vector2d::Zero();  ///< in the stored view as the camera would have taken it
+  };
+
+  const std::vector<Point>& points() const
+  {
+    return landmarks_;
+  }
+
   bool hasStructure() const
   {
     return !landmarks_.empty();
@@ -81,6 +94,12 @@ public:
    */
   bool start(const Correspondences& matches, const PlanarPose& pose);
 
+  /**
+   * The landmarks that an earlier tracker of this view had, with their depths known, instead of those there are.
+   * @param points their pixels need not be set. @return false, and nothing changes, when too few lie in the view.
+   */
+  bool restore(const std::vector<Point>& points);
+
   /** More landmarks from such matches, and better depths for those there are. */
   void extend(const Correspondences& matches, const PlanarPose& pose);
 
@@ -98,6 +117,7 @@ public:
     int supporting = 0;         ///< landmarks found where the pose puts them
     double rms = 0.0;           ///< root mean square of the supporting ones' residuals [px]
     double displacement = 0.0;  ///< median distance of the supporting ones from where the stored view has them [px]
+    std::vector<Eigen::Vector2d> supporters;  ///< Landmark::reference of the supporting ones
   };
 
   /**
@@ -119,13 +139,6 @@ public:
   Result locate(const Correspondences& matches) const;
 
 private:
-  struct Point
-  {
-    Landmark landmark;
-    double information;     ///< of the inverse depth
-    Eigen::Vector2d pixel;  ///< in the stored view
-  };
-
   Eigen::Vector2d pixelOf(const Eigen::Vector2d& level_point) const;
   Eigen::Vector2d levelOf(const Eigen::Vector2d& pixel) const;
   bool insideReference(const Eigen::Vector2d& pixel) const;

@@ -3,6 +3,7 @@
 #pragma once
 
 #include "view_servo/geometry/camera.h"
+#include "view_servo/views/view_structure.h"
 
 #include <Eigen/Geometry>
 #include <opencv2/core/mat.hpp>
@@ -53,7 +54,8 @@ bool isValidViewName(const std::string& name);
 Camera cameraOf(const StoredView& view, const Camera& current);
 
 /**
- * Stored views in a directory, one `NAME.yaml` each beside its image `NAME.HASH.png`.
+ * Stored views in a directory, one `NAME.yaml` each beside its image `NAME.HASH.png` and, where something has been
+ * learnt of it, its structure `NAME.REVISION.points`.
  *
  * A view exists when its yaml file does: it names the image, its size and checksum, and is put in place by rename(2)
  * after image and yaml were written and synced. So a crash leaves either the old view or the new one, and at most an
@@ -85,6 +87,20 @@ public:
 
   /** A text that changes whenever the view is saved anew. Does not read the image. @throws ViewStoreError as load(). */
   std::string revision(const std::string& name) const;
+
+  /**
+   * Stores what has been learnt of a view, instead of what was known before.
+   * @param revision that it belongs to: of a view that has been saved anew meanwhile, nothing is stored.
+   * @return whether it was stored. @throws ViewStoreError when there is no such view, or when writing fails; the view is
+   * as it was then.
+   */
+  bool saveStructure(const std::string& name, const std::string& revision, const ViewStructure& structure) const;
+
+  /**
+   * What has been learnt of a view since it was saved; without points when that is nothing. @throws ViewStoreError when
+   * there is no such view, or what has been learnt is damaged.
+   */
+  ViewStructure loadStructure(const std::string& name) const;
 
   struct Damaged
   {
