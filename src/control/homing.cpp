@@ -248,17 +248,10 @@ protected:
     {
       contradict();  // matches are there, but its points are nowhere
     }
-    if (!tracker_.hasStructure() && params_.hypotheses.motion == CameraMotion::PLANAR &&
-        best.support.size() >= ENOUGH_SUPPORT)
+    if (params_.hypotheses.motion == CameraMotion::PLANAR && best.support.size() >= ENOUGH_SUPPORT)
     {
-      const PlanarPose unit = best.view_in_camera;
-      const double distance = compose(inverse(camera_in_odom), best.view_in_odom).distance();
-      if (tracker_.start(best.support, { distance * unit.x, distance * unit.y, unit.yaw }))
+      if (startStructure(best, camera_in_odom))
       {
-        scale_ = 1.0;
-        scale_corrections_ = 0;
-        trail_.clear();
-        contradictions_ = 0;
         // Matches that hardly move tell no direction to follow, but where the points are.
         located = !tracker_.depthsKnown() && locate(stamp, evidence.pairs, camera_in_odom);
       }
@@ -418,6 +411,32 @@ private:
     return params_.approach.base == BaseKind::DIFFERENTIAL && blind_distance_ <= limits.max_blind_distance &&
            blind_turn_ <= limits.max_blind_turn &&
            shareInSight(compose(inverse(goalInOdom()), *odometry_.newest())) < limits.min_share;
+  }
+
+  /**
+   * Structure from the matches of a hypothesis, when there is none, or when its depths are only assumed and these tell
+   * them: the base was near the view then. @return whether it is new.
+   */
+  bool startStructure(const HeadingHypothesis& best, const PlanarPose& camera_in_odom)
+  {
+    if (tracker_.hasStructure() && tracker_.depthsKnown())
+    {
+      return false;
+    }
+    const PlanarPose unit = best.view_in_camera;
+    const double distance = compose(inverse(camera_in_odom), best.view_in_odom).distance();
+    ViewTracker fresh = tracker_;
+    if (!fresh.start(best.support, { distance * unit.x, distance * unit.y, unit.yaw }) ||
+        (tracker_.hasStructure() && !fresh.depthsKnown()))
+    {
+      return false;
+    }
+    tracker_ = std::move(fresh);
+    scale_ = 1.0;
+    scale_corrections_ = 0;
+    trail_.clear();
+    contradictions_ = 0;
+    return true;
   }
 
   /** After the points were not found: where are they by matches? */

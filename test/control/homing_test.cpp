@@ -141,7 +141,12 @@ class Drive
 {
 public:
   Drive(const Walls& walls, const HomingParams& params, const PlanarPose& start)
-    : walls_(walls), homing_(makeHoming(params, walls.target())), limiter_(VelocityLimits()), base_(start)
+    : Drive(walls, params, start, walls.target())
+  {
+  }
+
+  Drive(const Walls& walls, const HomingParams& params, const PlanarPose& start, const HomingTarget& target)
+    : walls_(walls), homing_(makeHoming(params, target)), limiter_(VelocityLimits()), base_(start)
   {
   }
 
@@ -184,6 +189,12 @@ public:
     BLANK            // black images and no matches
   };
 
+  /** Somebody else drives the base from now on. @param velocity in its frame [m/s, rad/s]. */
+  void push(const BaseVelocity& velocity)
+  {
+    pushed_ = velocity;
+  }
+
   void step(Sight sight = Sight::WALLS)
   {
     homing_->addOdometry(time(), base_);
@@ -210,7 +221,7 @@ public:
     {
       limiter_.stop();
     }
-    const BaseVelocity motion = CONTROL_PERIOD * limiter_.next(wanted, CONTROL_PERIOD);
+    const BaseVelocity motion = CONTROL_PERIOD * pushed_.value_or(limiter_.next(wanted, CONTROL_PERIOD));
     base_ = compose(base_, { motion.x(), motion.y(), motion.z() });
     travelled_ += motion.head<2>().norm();
     ++steps_;
@@ -237,6 +248,7 @@ private:
   cv::Mat black_ = cv::Mat(Walls::HEIGHT, Walls::WIDTH, CV_8UC1, cv::Scalar(0));
   cv::Mat something_else_ = test::texturedPicture(99, cv::Size(Walls::WIDTH, Walls::HEIGHT));
   Rng rng_{ 5 };
+  std::optional<BaseVelocity> pushed_;
   PlanarPose base_;
   double travelled_ = 0.0;
   int steps_ = 0;
@@ -832,6 +844,72 @@ TEST(ServoHoming, TellsWhereTheViewIsInMetres)
   EXPECT_GT(normalized / count, 0.02);
   ASSERT_TRUE(run.report().goal_in_odom);
   EXPECT_LT(run.report().goal_in_odom->distance(), 0.003);
+}
+
+TEST(ServoHoming, LearnsWhereTheViewIsWhenItIsDrivenAwayFromThere)
+{
+  const Walls walls;
+  HomingParams params = servoParams();
+  params.dwell = 1e3;  // nobody wants it to arrive
+  Drive run(walls, params, {});
+  run.push({ -0.15, 0.03, 0.0 });
+  run.runFor(4.0);
+  EXPECT_NEAR(run.base().x, -0.6, 0.02);
+  ASSERT_TRUE(run.report().goal_in_odom) << run.report().reason;
+  EXPECT_LT(run.report().goal_in_odom->distance(), 0.03);
+  EXPECT_GE(run.homing().structure().points.size(), 30U);
+}
+
+TEST(ServoHoming, KnowsTheDistanceFromTheFirstMatchesOnOnceTheViewIsLearnt)
+{
+  const Walls walls;
+  Drive lesson(walls, servoParams(), { -0.7, 0.2, 0.05 });
+  EXPECT_TRUE(lesson.homing().structure().points.empty());
+  lesson.runFor(60.0);
+  ASSERT_EQ(lesson.report().state, HomingState::ARRIVED);
+  HomingTarget target = walls.target();
+  target.structure = lesson.homing().structure();
+  EXPECT_GE(target.structure.points.size(), 30U);
+
+  Drive run(walls, servoParams(), { -0.5, -0.3, -0.1 }, target);
+  run.runFor(0.6);  // two images after the first matches
+  ASSERT_TRUE(run.report().goal_in_odom) << run.report().reason;
+  EXPECT_LT(run.report().goal_in_odom->distance(), 0.03);
+  EXPECT_LT(std::abs(run.report().goal_in_odom->yaw), 0.5 * DEGREE);
+  run.runFor(60.0);
+  EXPECT_EQ(run.report().state, HomingState::ARRIVED);
+  EXPECT_LT(run.base().distance(), 0.005);
+
+  // What is wrong now is not used for long: the view's points are nowhere near where it has them.
+  for (StructurePoint& point : target.structure.points)
+  {
+    point.inverse_depth = point.pixel.x() < 160.0 ? 0.1 : 5.0;
+  }
+  Drive misled(walls, servoParams(), { -0.5, -0.3, -0.1 }, target);
+  misled.runFor(60.0);
+  EXPECT_EQ(misled.report().state, HomingState::ARRIVED) << misled.report().reason;
+  EXPECT_LT(misled.base().distance(), 0.005);
+}
+
+TEST(ServoHoming, ForgetsPointsThatAreNotSeenAtTheView)
+{
+  const Walls walls;
+  Drive lesson(walls, servoParams(), { -0.7, 0.2, 0.05 });
+  lesson.runFor(60.0);
+  HomingTarget target = walls.target();
+  target.structure = lesson.homing().structure();
+  const auto moved = [](const StructurePoint& point) {
+    return point.inverse_depth > 50.0;
+  };
+  // Two things that have gone: their points are never where the pose puts them.
+  target.structure.points.push_back({ { 101.5, 120.5 }, 60.0, 0.02 });
+  target.structure.points.push_back({ { 201.5, 60.5 }, 60.0, 0.02 });
+  Drive run(walls, servoParams(), { -0.5, -0.3, -0.1 }, target);
+  run.runFor(60.0);
+  ASSERT_EQ(run.report().state, HomingState::ARRIVED);
+  const ViewStructure learnt = run.homing().structure();
+  EXPECT_GE(learnt.points.size(), 30U);
+  EXPECT_EQ(std::count_if(learnt.points.begin(), learnt.points.end(), moved), 0);
 }
 
 TEST(MakeHoming, RefusesTheThesisWayForABaseThatCannotSlide)

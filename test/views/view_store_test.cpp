@@ -32,6 +32,7 @@ using view_servo::StoredView;
 using view_servo::ViewPose;
 using view_servo::ViewStore;
 using view_servo::ViewStoreError;
+using view_servo::ViewStructure;
 using view_servo::test::TemporaryDirectory;
 
 namespace
@@ -295,6 +296,62 @@ TEST_F(ViewStoreTest, RevisionChangesWithTheView)
   EXPECT_EQ(store_.revision("desk"), first);
   store_.save(plainView("desk", 2), true);
   EXPECT_NE(store_.revision("desk"), first);
+}
+
+TEST_F(ViewStoreTest, ReturnsTheStructureOfAViewAndForgetsItWithTheView)
+{
+  const auto learnt = [](double depth) {
+    return ViewStructure{ { { { 1.0 / 3.0, 47.0 }, 1.0 / depth, 0.1 / 7.0 }, { { 63.0, 0.0 }, 1e-3, 1e9 } } };
+  };
+  store_.save(plainView("desk"), false);
+  EXPECT_TRUE(store_.loadStructure("desk").points.empty());
+  const std::string revision = store_.revision("desk");
+  EXPECT_TRUE(store_.saveStructure("desk", revision, learnt(2.0)));
+  EXPECT_TRUE(store_.saveStructure("desk", revision, learnt(3.0)));
+  const ViewStructure found = store_.loadStructure("desk");
+  ASSERT_EQ(found.points.size(), 2U);
+  EXPECT_EQ(found.points[0].pixel, learnt(3.0).points[0].pixel);
+  EXPECT_EQ(found.points[0].inverse_depth, 1.0 / 3.0);
+  EXPECT_EQ(found.points[0].information, 0.1 / 7.0);
+  EXPECT_EQ(store_.revision("desk"), revision) << "the view is as it was";
+  EXPECT_EQ(filesIn(store_.directory()).size(), 3U);
+
+  store_.save(plainView("desk", 2), true);
+  EXPECT_TRUE(store_.loadStructure("desk").points.empty()) << "it was of the view before";
+  EXPECT_FALSE(store_.saveStructure("desk", revision, learnt(2.0)));
+  EXPECT_EQ(filesIn(store_.directory()).size(), 2U);
+  EXPECT_TRUE(store_.saveStructure("desk", store_.revision("desk"), learnt(2.0)));
+  store_.remove("desk");
+  EXPECT_TRUE(filesIn(store_.directory()).empty());
+  EXPECT_ERROR(store_.saveStructure("desk", revision, learnt(2.0)), "there is none of that name");
+  EXPECT_ERROR(store_.loadStructure("desk"), "there is none of that name");
+}
+
+TEST_F(ViewStoreTest, DamagedStructureLeavesTheViewUsable)
+{
+  store_.save(plainView("desk"), false);
+  const std::string revision = store_.revision("desk");
+  store_.saveStructure("desk", revision, { { { { 1.0, 2.0 }, 0.5, 0.1 } } });
+  const fs::path file = store_.directory() / ("desk." + revision + ".points");
+  std::string text = readBytes(file);
+  text[text.size() / 2] ^= 1;
+  writeBytes(file, text);
+  EXPECT_ERROR(store_.loadStructure("desk"), "does not agree with the checksum");
+  EXPECT_EQ(store_.load("desk").name, "desk");
+  EXPECT_EQ(store_.list().names, std::vector<std::string>{ "desk" });
+  EXPECT_TRUE(store_.list().damaged.empty());
+}
+
+TEST(ViewStructureText, SaysWhatIsWrong)
+{
+  const std::string header = toText({});
+  EXPECT_TRUE(structureFromText(header).points.empty());
+  EXPECT_EQ(structureFromText(header + "1 2 0.5 3\n").points.size(), 1U);
+  for (const char* bad : { "1 2 0.5", "1 2 0.5 3 4", "1 2 -0.5 3", "1 2 0.5 0", "nan 2 0.5 3", "a" })
+  {
+    EXPECT_ERROR(structureFromText(header + "1 2 0.5 3\n" + bad + "\n"), "line 3 is no point") << bad;
+  }
+  EXPECT_ERROR(structureFromText("another format\n"), "not a structure");
 }
 
 TEST_F(ViewStoreTest, ListsSorted)
@@ -600,7 +657,8 @@ TEST_F(ViewStoreTest, LeavesFilesOfOthersAlone)
   const std::set<std::string> others = { "dock.backup.yaml", "dock.photo.png",
                                          "dock.txt",         "dock.0123.png",
                                          "dock.tmp",         "dock2.yaml.tmp",
-                                         "dock.png.tmp",     "dock.0123456789ABCDEF.png" };
+                                         "dock.png.tmp",     "dock.0123456789ABCDEF.png",
+                                         "dock.points",      "dock.0123456789abcdef.points.txt" };
   for (const std::string& other : others)
   {
     writeBytes(store_.directory() / other, "mine");
