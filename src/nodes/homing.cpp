@@ -12,6 +12,7 @@
 #include "view_servo/ros/conversions.h"
 #include "view_servo/ros/driver_node.h"
 #include "view_servo/ros/homing_worker.h"
+#include "view_servo/ros/idle_view.h"
 #include "view_servo/ros/image_source.h"
 #include "view_servo/ros/odometry_input.h"
 #include "view_servo/ros/transform_source.h"
@@ -39,7 +40,8 @@ namespace view_servo
  *  - `image_raw`, `camera_info`: see CameraInput;
  *  - `point_matches` (view_servo/PointMatches), `line_matches` (view_servo/LineMatches), of matchers that follow
  *    `~wanted_view`: either may be silent;
- *  - `odom` (nav_msgs/Odometry), of `~base_frame`; tf.
+ *  - `odom` (nav_msgs/Odometry), of `~base_frame`; tf;
+ *  - `learn_view` (view_servo/WantedView): the view to learn while somebody drives the base away from it.
  *
  * Publishes, besides what every driver does (see DriverNode):
  *  - `cmd_vel` (geometry_msgs/Twist, in base_link) and `cmd_vel_stamped`, or `cmd_vel_dry` and `cmd_vel_dry_stamped`; zero
@@ -64,6 +66,7 @@ public:
   HomingDriver(DriverContext& context, const Params& params)
     : context_(context),
       params_(params),
+      idle_view_(params.view),
       base_frame_(withoutSlash(params.base_frame)),
       images_(context.addInput("image", context.quoted("image_raw"), params.image_timeout)),
       outcomes_(context.addInput("image that was worked on", context.quoted("image_raw"),
@@ -80,7 +83,10 @@ public:
           context.resolved("image_raw"),
           [this](const HomingOutcome& outcome) {
             context_.runLocked("the outcome of an image", [&] { onOutcome(outcome); });
-            storeStructure(store_, outcome);
+            if (storeStructure(store_, outcome))
+            {
+              context_.runLocked("the end of a lesson", [&] { endLesson(outcome.task->view); });
+            }
           },
           [this](const CameraFrame& frame) { watchView(frame); }),
       camera_(
@@ -92,6 +98,7 @@ public:
   {
     images_.setMaxAge(params.camera.max_image_age);
     matches_.followPace(3.0);
+    context.listen<WantedView>("learn_view", 1, [this](const WantedView::ConstPtr& m) { learn(m->view); });
     context.diagnostics().add("camera", &camera_, &CameraInput::diagnose);
     want(params_.view, "");
     context.listen<PointMatches>("point_matches", 1, [this](const PointMatches::ConstPtr& m) {
@@ -144,12 +151,12 @@ public:
   void end()
   {
     setTask(nullptr);
-    want(params_.view, "");
+    want(idle_view_.name(), "");
   }
 
   std::string idleView() const
   {
-    return params_.view;
+    return idle_view_.name();
   }
 
   // ------------------------------------------------------------------------------------------------------ control
@@ -232,6 +239,26 @@ private:
     lines_.want(view, goal);
   }
 
+  /** From now on a view is followed without a goal until it is learnt; empty: the one of the parameters again. */
+  void learn(const std::string& view)
+  {
+    idle_view_.learn(view);
+    if (context_.goalId().empty())
+    {
+      setTask(nullptr);
+      want(idle_view_.name(), "");
+      context_.requestIdleView(idle_view_.name());
+    }
+  }
+
+  void endLesson(const std::string& view)
+  {
+    if (idle_view_.learnt() == view)
+    {
+      learn("");
+    }
+  }
+
   /** Replaces the task, and forgets all that belongs to the old one; null: no task. */
   void setTask(std::shared_ptr<HomingTask> task)
   {
@@ -285,6 +312,11 @@ private:
       return;
     }
     images_.accept();
+    if (idle_view_.overdue())
+    {
+      ROS_WARN_STREAM("view '" << idle_view_.learnt() << "' is not learnt: the base has not moved away from it");
+      learn("");
+    }
     if (task_ && !sameCalibration(*task_->info, *frame.info))
     {
       context_.abort("the camera's calibration has changed");
@@ -368,20 +400,23 @@ private:
     }
   }
 
-  /** Without a goal, the direction of ~view is estimated all the same. By the worker's thread. */
+  /** Without a goal, the direction of a view is estimated all the same. By the worker's thread. */
   void watchView(const CameraFrame& frame)
   {
     constexpr std::chrono::seconds PERIOD(1);
-    if (params_.view.empty() || Clock::now() < next_watch_)
+    const auto [view, lesson] =
+        context_.locked([this] { return std::pair(idle_view_.name(), !idle_view_.learnt().empty()); });
+    if (view.empty() || Clock::now() < next_watch_)
     {
       return;
     }
     next_watch_ = Clock::now() + PERIOD;
     try
     {
-      const std::shared_ptr<HomingTask> task = makeTask(loadLearntView(store_, params_.view), frame, params_.homing);
+      const std::shared_ptr<HomingTask> task = makeTask(loadLearntView(store_, view), frame, params_.homing);
+      task->lesson = lesson;
       context_.runLocked("the watch for a view", [&] {
-        if (!task_ && context_.goalId().empty())
+        if (!task_ && context_.goalId().empty() && idle_view_.name() == task->view)
         {
           setTask(task);
         }
@@ -389,7 +424,7 @@ private:
     }
     catch (const std::exception& error)
     {
-      ROS_WARN_STREAM_THROTTLE(10.0, "view '" << params_.view << "' is not watched: " << oneLine(error));
+      ROS_WARN_STREAM_THROTTLE(10.0, "view '" << view << "' is not watched: " << oneLine(error));
     }
   }
 
@@ -398,6 +433,7 @@ private:
 
   DriverContext& context_;
   const Params params_;
+  IdleView idle_view_;
   const std::string base_frame_;
   DriverInput& images_;
   DriverInput& outcomes_;

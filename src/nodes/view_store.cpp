@@ -5,6 +5,7 @@
 #include "view_servo/GetView.h"
 #include "view_servo/ListViews.h"
 #include "view_servo/SaveView.h"
+#include "view_servo/WantedView.h"
 #include "view_servo/images/image_io.h"
 #include "view_servo/ros/camera_input.h"
 #include "view_servo/ros/conversions.h"
@@ -32,6 +33,7 @@ namespace view_servo
  *  - `image_raw` (sensor_msgs/Image), `camera_info` (sensor_msgs/CameraInfo), `/tf`, `/tf_static`.
  *
  * Publishes:
+ *  - `learn_view` (view_servo/WantedView): a view that was saved to be learnt, for homing;
  *  - `/diagnostics` (diagnostic_msgs/DiagnosticArray): 1 Hz, camera.
  *
  * Services:
@@ -52,6 +54,7 @@ public:
       sources_(params_.sources, camera_),
       store_(sources_.store())
   {
+    learn_publisher_ = nh_.advertise<WantedView>("learn_view", 1);
     save_service_ = serve("save", &ViewStoreNode::save, this);
     list_service_ = serve("list", &ViewStoreNode::list, this);
     delete_service_ = serve("delete", &ViewStoreNode::remove, this);
@@ -83,6 +86,16 @@ private:
                        std::to_string(view.image.rows) + (view.camera ? "" : ", without a calibration") +
                        (view.pose ? ", with its pose in " + view.pose->frame : ", without a pose") +
                        (lack.empty() ? "" : "; but the picture is " + lack) + (warning.empty() ? "" : "; " + warning);
+    if (request.learn)
+    {
+      WantedView wanted;
+      wanted.header.stamp = ros::Time::now();
+      wanted.view = view.name;
+      learn_publisher_.publish(wanted);
+      response.message += learn_publisher_.getNumSubscribers() > 0
+                              ? "; it is learnt while the base moves by 0.3 m"
+                              : "; but it is not learnt: no homing listens to '" + learn_publisher_.getTopic() + "'";
+    }
     ROS_INFO_STREAM(response.message);
   }
 
@@ -155,6 +168,7 @@ private:
   ImageSourceReader sources_;
   const ViewStore& store_;
   std::mutex write_mutex_;  // one writer at a time
+  ros::Publisher learn_publisher_;
   ros::ServiceServer save_service_;
   ros::ServiceServer list_service_;
   ros::ServiceServer delete_service_;

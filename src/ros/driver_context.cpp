@@ -116,6 +116,14 @@ void DriverContext::requestView(const std::string& view)
   });
 }
 
+void DriverContext::requestIdleView(const std::string& view)
+{
+  if (goalId().empty())
+  {
+    publishWantedView(view, "");
+  }
+}
+
 void DriverContext::publishWantedView(const std::string& view, const std::string& goal)
 {
   WantedView message;

@@ -21,7 +21,7 @@ std::shared_ptr<HomingTask> makeHomingTask(const LearntView& stored, const senso
   target.mount = mount;
   target.structure = stored.structure;
   return std::make_shared<HomingTask>(
-      HomingTask{ stored.view.name, stored.revision, info, makeHoming(params, target), false });
+      HomingTask{ stored.view.name, stored.revision, info, makeHoming(params, target), false, false });
 }
 
 LearntView loadLearntView(const ViewStore& store, const std::string& name)
@@ -40,12 +40,15 @@ LearntView loadLearntView(const ViewStore& store, const std::string& name)
   return result;
 }
 
-void storeStructure(const ViewStore& store, const HomingOutcome& outcome)
+bool storeStructure(const ViewStore& store, const HomingOutcome& outcome)
 {
+  constexpr double FAR_ENOUGH = 0.3;  // [m]
   HomingTask& task = *outcome.task;
-  if (outcome.report.state != HomingState::ARRIVED || task.structure_stored)
+  const HomingReport& report = outcome.report;
+  const bool learnt = task.lesson && report.goal_in_odom && report.distance >= FAR_ENOUGH;
+  if (task.structure_stored || !(learnt || report.state == HomingState::ARRIVED))
   {
-    return;
+    return false;
   }
   task.structure_stored = true;
   const ViewStructure structure = task.homing->structure();
@@ -60,6 +63,7 @@ void storeStructure(const ViewStore& store, const HomingOutcome& outcome)
   {
     ROS_WARN_STREAM(oneLine(error));
   }
+  return true;
 }
 
 HomingWorker::HomingWorker(std::string image_topic, std::function<void(const HomingOutcome&)> on_outcome,

@@ -235,6 +235,9 @@ public:
   /** Publishes on `~wanted_view` the view of the goal that is being prepared. Only for prepare(), without the mutex. */
   void requestView(const std::string& view);
 
+  /** Publishes that a view is wanted without a goal, unless there is a goal; empty: none. The mutex is held. */
+  void requestIdleView(const std::string& view);
+
   /** Id of the goal; empty without one. The mutex is held. */
   virtual std::string goalId() const = 0;
   /** Whether there is a goal and it has begun. The mutex is held. */

@@ -39,6 +39,7 @@ struct HomingTask
   std::string revision;                  ///< ViewStore::revision() of it
   sensor_msgs::CameraInfoConstPtr info;  ///< calibration that `homing` was made with
   std::unique_ptr<Homing> homing;        ///< only the worker's thread uses it
+  bool lesson = false;                   ///< the view is to be learnt: the structure is stored without an arrival
   bool structure_stored = false;         ///< by storeStructure()
 };
 
@@ -60,10 +61,12 @@ struct HomingOutcome
 };
 
 /**
- * Stores, once, what a task has learnt of its view when the base has arrived; that this failed is a warning. Takes as long
- * as a disk does: only for the worker's thread.
+ * Stores, once, what a task has learnt of its view: when the base has arrived, and in a lesson when it is 0.3 m away from
+ * the view and knows that in metres. That storing failed is a warning. Takes as long as a disk does: only for the
+ * worker's thread.
+ * @return whether it was tried now.
  */
-void storeStructure(const ViewStore& store, const HomingOutcome& outcome);
+bool storeStructure(const ViewStore& store, const HomingOutcome& outcome);
 
 /**
  * Works on images, matches and odometry for one task at a time, in a thread of its own because an image takes longer
