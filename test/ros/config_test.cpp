@@ -2,7 +2,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 
 /** @file
- * The files in config/ and the tables in docs/parameters*.md say what the tables of parameters in the sources say: names,
+ * The files in config/ and the tables in docs/ say what the tables of parameters in the sources say: names,
  * types, defaults, units, ranges and meanings. VIEW_SERVO_UPDATE=1 writes them anew.
  */
 #include "sim/nomad.h"
@@ -94,12 +94,12 @@ public:
           { "## Homography tracker", parameters(tracker) },
           { "## 2.5D servoing", parameters(servo) },
           { "## View store", parameters(store) } } },
-      { "parameters_of_simulation",
-        { { "## Both robots", parameters(simulation) },
-          { "## The base", parameters(nomad) },
-          { "## The arm", parameters(puma) },
-          { "## A run of the base", parameters(homing_run) },
-          { "## A run of the arm", parameters(arm_run) } } },
+      { "simulation",
+        { { "## Parameters of both", parameters(simulation) },
+          { "## Parameters of `nomad_sim`", parameters(nomad) },
+          { "## Parameters of `puma_sim`", parameters(puma) },
+          { "## Parameters of `run_homing`", parameters(homing_run) },
+          { "## Parameters of `run_arm`", parameters(arm_run) } } },
     };
   }
 };
