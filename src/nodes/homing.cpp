@@ -4,6 +4,7 @@
 #include "view_servo/HomeToViewAction.h"
 #include "view_servo/LineMatches.h"
 #include "view_servo/PointMatches.h"
+#include "view_servo/WantedView.h"
 #include "view_servo/control/motion_watch.h"
 #include "view_servo/parameters/error_text.h"
 #include "view_servo/ros/base_conversions.h"
