@@ -29,6 +29,8 @@ namespace fs = std::filesystem;
 using view_servo::Camera;
 using view_servo::isValidViewName;
 using view_servo::StoredView;
+using view_servo::structureFromText;
+using view_servo::toText;
 using view_servo::ViewPose;
 using view_servo::ViewStore;
 using view_servo::ViewStoreError;
