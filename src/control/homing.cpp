@@ -297,6 +297,10 @@ protected:
         follow(stamp, averageAtRest(*base, view));
         view_covariance_ = inOdometry(result, camera.yaw);
         supporters_ = result.supporters;
+        if (result.displacement <= IN_PLACE)
+        {
+          in_place_ = *view_in_odom_;
+        }
       }
     }
     if (view_in_odom_)
@@ -311,6 +315,7 @@ private:
   static constexpr std::size_t ENOUGH_SUPPORT = 40;  // matches that structure is made from
   static constexpr double CLOCKS_PERIOD = 0.5;       // between two estimates of their offset, which take a while [s]
   static constexpr int ENOUGH_CORRECTIONS = 10;      // of the scale, each by a fifth, until it is that of metres
+  static constexpr double IN_PLACE = 1.5;            // median displacement of the view's points at the view [px]
   static constexpr int MIN_UPDATES = 2;              // sets of matches that agree before a hypothesis is followed
 
   /** The base's pose at the view, in odometry's frame. */
@@ -423,8 +428,10 @@ private:
     {
       return false;
     }
+    constexpr double LONGEST = 1.0;  // way by odometry that says how far it is from where the view was in place [m]
+    const bool from_view = in_place_ && compose(inverse(camera_in_odom), *in_place_).distance() < LONGEST;
     const PlanarPose unit = best.view_in_camera;
-    const double distance = compose(inverse(camera_in_odom), best.view_in_odom).distance();
+    const double distance = compose(inverse(camera_in_odom), from_view ? *in_place_ : best.view_in_odom).distance();
     ViewTracker fresh = tracker_;
     if (!fresh.start(best.support, { distance * unit.x, distance * unit.y, unit.yaw }) ||
         (tracker_.hasStructure() && !fresh.depthsKnown()))
@@ -433,7 +440,7 @@ private:
     }
     tracker_ = std::move(fresh);
     scale_ = 1.0;
-    scale_corrections_ = 0;
+    scale_corrections_ = from_view ? ENOUGH_CORRECTIONS : 0;
     trail_.clear();
     contradictions_ = 0;
     return true;
@@ -596,11 +603,10 @@ private:
   /** State and arrival while the view's points are tracked. */
   void judgePlace(double stamp, const PlanarPose& goal)
   {
-    constexpr double ARRIVED_DISPLACEMENT = 1.5;  // of the view's points, in the median [px]
-    constexpr double ARRIVED_CONFIDENCE = 0.75;   // share of the points that must be there
+    constexpr double ARRIVED_CONFIDENCE = 0.75;  // share of the points that must be there
     constexpr double AT_VIEW_DISPLACEMENT = 15.0;
     // Whatever the structure and its scale say, the points must be where the view has them.
-    const bool in_place = report_.displacement <= ARRIVED_DISPLACEMENT && report_.confidence >= ARRIVED_CONFIDENCE &&
+    const bool in_place = report_.displacement <= IN_PLACE && report_.confidence >= ARRIVED_CONFIDENCE &&
                           report_.similarity >= params_.min_similarity;
     report_.at_view = report_.distance <= params_.arrival_distance && std::abs(goal.yaw) <= params_.arrival_yaw &&
                       report_.displacement <= AT_VIEW_DISPLACEMENT && report_.similarity >= params_.min_similarity;
@@ -670,6 +676,7 @@ private:
   double blind_turn_ = 0.0;      // [rad]
   double within_since_ = NOT_A_NUMBER;
   int contradictions_ = 0;
+  std::optional<PlanarPose> in_place_;       // where the view was, in odometry's frame, when its points were in place
   std::vector<Eigen::Vector2d> supporters_;  // in the last image in which the points were found
   double newest_matches_ = NOT_A_NUMBER;     // stamp of the newest image with matches
   double matches_period_ = 0.2;              // between the images with matches, in the mean of late [s]

@@ -898,12 +898,19 @@ TEST(ServoHoming, ForgetsPointsThatAreNotSeenAtTheView)
   lesson.runFor(60.0);
   HomingTarget target = walls.target();
   target.structure = lesson.homing().structure();
-  const auto moved = [](const StructurePoint& point) {
-    return point.inverse_depth > 50.0;
+  // Two things that have gone since the view was stored.
+  target.image = target.image.clone();
+  const std::vector<Eigen::Vector2d> gone = { { 101.0, 121.0 }, { 201.0, 61.0 } };
+  for (const Eigen::Vector2d& at : gone)
+  {
+    const cv::Rect place(cv::Point2d(at.x() - 20.0, at.y() - 20.0), cv::Size(41, 41));
+    test::texturedPicture(33, place.size()).copyTo(target.image(place));
+    target.structure.points.push_back({ at, 1.0 / 1.8, 0.02 });
+  }
+  const auto moved = [&gone](const StructurePoint& point) {
+    return std::any_of(gone.begin(), gone.end(),
+                       [&](const Eigen::Vector2d& at) { return (point.pixel - at).norm() < 1.0; });
   };
-  // Two things that have gone: their points are never where the pose puts them.
-  target.structure.points.push_back({ { 101.5, 120.5 }, 60.0, 0.02 });
-  target.structure.points.push_back({ { 201.5, 60.5 }, 60.0, 0.02 });
   Drive run(walls, servoParams(), { -0.5, -0.3, -0.1 }, target);
   run.runFor(60.0);
   ASSERT_EQ(run.report().state, HomingState::ARRIVED);
