@@ -852,6 +852,9 @@ TEST(ServoHoming, LearnsWhereTheViewIsWhenItIsDrivenAwayFromThere)
   HomingParams params = servoParams();
   params.dwell = 1e3;  // nobody wants it to arrive
   Drive run(walls, params, {});
+  run.push(BaseVelocity::Zero());
+  run.runFor(2.0);
+  EXPECT_FALSE(run.report().goal_in_odom);
   run.push({ -0.15, 0.03, 0.0 });
   run.runFor(4.0);
   EXPECT_NEAR(run.base().x, -0.6, 0.02);

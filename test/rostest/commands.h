@@ -9,6 +9,7 @@
 
 #include <algorithm>
 #include <chrono>
+#include <cmath>
 #include <functional>
 #include <mutex>
 #include <string>
@@ -27,6 +28,16 @@ inline bool moves(const geometry_msgs::Twist& twist)
 inline bool moves(const geometry_msgs::TwistStamped& message)
 {
   return moves(message.twist);
+}
+
+inline double speedOf(const geometry_msgs::Twist& twist)
+{
+  return std::hypot(twist.linear.x, std::hypot(twist.linear.y, twist.linear.z));
+}
+
+inline double speedOf(const geometry_msgs::TwistStamped& message)
+{
+  return speedOf(message.twist);
 }
 
 /** The commands of a topic, with when they came. */
@@ -69,6 +80,17 @@ public:
       }
     }
     return -1.0;
+  }
+  /** The largest speed commanded since a moment [m/s]. */
+  double fastestAfter(Clock::time_point moment) const
+  {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    double fastest = 0.0;
+    for (auto command = list_.rbegin(); command != list_.rend() && command->time > moment; ++command)
+    {
+      fastest = std::max(fastest, speedOf(command->message));
+    }
+    return fastest;
   }
   Message first() const
   {

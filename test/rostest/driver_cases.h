@@ -4,7 +4,12 @@
 
 #include "driver_test.h"
 
+#include <dynamic_reconfigure/Reconfigure.h>
 #include <std_msgs/Bool.h>
+
+#include <chrono>
+#include <limits>
+#include <string>
 
 namespace view_servo
 {
@@ -156,6 +161,33 @@ TYPED_TEST_P(DriverCases, GivesUpInTime)
   EXPECT_GE(final.duration, 1.0);
 }
 
+TYPED_TEST_P(DriverCases, KeepsLimitsThatPeopleChangeWhileItDrives)
+{
+  using Clock = std::chrono::steady_clock;
+  constexpr double SLOW = 0.002;  // [m/s]
+  constexpr std::chrono::duration<double> AT_ONCE(0.1 * SLOWDOWN);
+  this->drive();
+  const std::string service = this->ns_ + "/" + TypeParam::DRIVER + "/set_parameters";
+  const auto set = [&](double max_speed) {
+    dynamic_reconfigure::Reconfigure change;
+    change.request.config.doubles.resize(1);
+    change.request.config.doubles[0].name = "max_speed";
+    change.request.config.doubles[0].value = max_speed;
+    EXPECT_TRUE(callService(service, change.request, change.response));
+    EXPECT_EQ(change.response.config.doubles.size(), 4U);
+    return change.response.config.doubles.empty() ? 0.0 : change.response.config.doubles[0].value;
+  };
+  EXPECT_EQ(set(SLOW), SLOW);
+  const auto changed = Clock::now() + std::chrono::duration_cast<Clock::duration>(AT_ONCE);
+  EXPECT_TRUE(waitUntil([&] { return this->commands_.lastMotionAfter(changed) > 0.2; })) << this->reason();
+  EXPECT_LE(this->commands_.fastestAfter(changed), SLOW * (1.0 + 1e-9));
+  const double most = set(1e9);
+  EXPECT_GT(most, SLOW);
+  EXPECT_LT(most, 1.0) << "no more than it was started with";
+  EXPECT_TRUE(waitUntil([&] { return this->commands_.fastestAfter(changed) > SLOW; })) << this->reason();
+  EXPECT_EQ(set(std::numeric_limits<double>::quiet_NaN()), most);
+}
+
 TYPED_TEST_P(DriverCases, StopsWhenThePeerFallsSilentAndGoesOnWithIt)
 {
   this->drive();
@@ -278,10 +310,10 @@ REGISTER_TYPED_TEST_SUITE_P(DriverCases, WaitsForAPeerThatAnswersLate, EndsInTim
                             EndsItsProcessWhileItPrepares, RefusesAViewThatItsPeerRefuses, RefusesAViewThatIsNotThere,
                             RefusesWhenDisabled, RefusesTimesThatAreNone, StopsWhenDisabled,
                             StopsWhenTheGoalIsCancelled, StopsForAnotherGoal, StopsBeforeItsProcessEnds, GivesUpInTime,
-                            StopsWhenThePeerFallsSilentAndGoesOnWithIt, GivesUpWhenThePeerStaysSilent,
-                            StopsWhenTimeGoesBack, StopsForStampsThatStandStill, StopsForStampsThatAreZero,
-                            StopsWhenTheCalibrationChanges, StopsWhenNobodyFollowsAnyMore, StandsWhileItIsHeld,
-                            SurvivesWhateverIsInMessages, TakesManyGoalsWhilePeersComeAndGo);
+                            KeepsLimitsThatPeopleChangeWhileItDrives, StopsWhenThePeerFallsSilentAndGoesOnWithIt,
+                            GivesUpWhenThePeerStaysSilent, StopsWhenTimeGoesBack, StopsForStampsThatStandStill,
+                            StopsForStampsThatAreZero, StopsWhenTheCalibrationChanges, StopsWhenNobodyFollowsAnyMore,
+                            StandsWhileItIsHeld, SurvivesWhateverIsInMessages, TakesManyGoalsWhilePeersComeAndGo);
 
 }  // namespace test
 }  // namespace view_servo

@@ -67,6 +67,13 @@ public:
     return velocity_;
   }
 
+  /** New limits, which must be valid; a velocity beyond them is brought within at once. */
+  void setLimits(const VelocityLimits& limits)
+  {
+    limits_ = limits;
+    velocity_ *= scaleWithin(velocity_, limits_.max_speed, limits_.max_turn_rate);
+  }
+
   /** Zero at once. */
   void stop()
   {

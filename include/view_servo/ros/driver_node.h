@@ -6,6 +6,7 @@
 #include "view_servo/parameters/error_text.h"
 #include "view_servo/ros/driver_context.h"
 #include "view_servo/ros/inbox.h"
+#include "view_servo/ros/live_parameters.h"
 #include "view_servo/ros/timings.h"
 
 #include <actionlib/server/action_server.h>
@@ -114,6 +115,7 @@ private:
   using Params = typename Driver::Params;
 
   static constexpr const char* STOP_TOPIC = "stop";
+  static constexpr double LEAST_LIMIT = 1e-3;  // of speeds and accelerations that people choose [SI units]
 
   enum class Stage
   {
@@ -155,6 +157,15 @@ private:
     server_.registerCancelCallback([this](Handle handle) { cancelled_goals_.put(handle); });
     server_.start();
     goal_thread_ = std::thread([this] { prepareGoals(); });
+    VelocityLimits limits = params_.limits;
+    live_limits_ = std::make_unique<LiveParameters>(
+        private_nh_,
+        upToNow(parameters(limits), { "max_speed", "max_turn_rate", "max_acceleration", "max_turn_acceleration" },
+                LEAST_LIMIT),
+        [this](const std::vector<LiveNumber>& numbers) {
+          const VelocityLimits live{ numbers[0].value, numbers[1].value, numbers[2].value, numbers[3].value };
+          locked([&] { limiter_.setLimits(live); });
+        });
     control_timer_ = every(1.0 / params_.node.control_rate, "control",
                            [this] { runLocked("a cycle of control", [this] { cycle(); }); });
   }
@@ -533,6 +544,7 @@ private:
   bool held_ = false;  // by `stop`
   std::thread goal_thread_;
   ros::WallTimer control_timer_;
+  std::unique_ptr<LiveParameters> live_limits_;
 };
 
 }  // namespace view_servo
