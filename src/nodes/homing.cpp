@@ -405,6 +405,7 @@ private:
   void watchView(const CameraFrame& frame)
   {
     constexpr std::chrono::seconds PERIOD(1);
+    constexpr double NEVER = 1e9;  // [s]
     const auto [view, lesson] =
         context_.locked([this] { return std::pair(idle_view_.name(), !idle_view_.learnt().empty()); });
     if (view.empty() || Clock::now() < next_watch_)
@@ -414,7 +415,9 @@ private:
     next_watch_ = Clock::now() + PERIOD;
     try
     {
-      const std::shared_ptr<HomingTask> task = makeTask(loadLearntView(store_, view), frame, params_.homing);
+      HomingParams homing = params_.homing;
+      homing.dwell = lesson ? NEVER : homing.dwell;  // it begins where the view was stored
+      const std::shared_ptr<HomingTask> task = makeTask(loadLearntView(store_, view), frame, homing);
       task->lesson = lesson;
       context_.runLocked("the watch for a view", [&] {
         if (!task_ && context_.goalId().empty() && idle_view_.name() == task->view)

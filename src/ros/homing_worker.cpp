@@ -45,8 +45,9 @@ bool storeStructure(const ViewStore& store, const HomingOutcome& outcome)
   constexpr double FAR_ENOUGH = 0.3;  // [m]
   HomingTask& task = *outcome.task;
   const HomingReport& report = outcome.report;
-  const bool learnt = task.lesson && report.goal_in_odom && report.distance >= FAR_ENOUGH;
-  if (task.structure_stored || !(learnt || report.state == HomingState::ARRIVED))
+  const bool learnt =
+      task.lesson ? report.goal_in_odom && report.distance >= FAR_ENOUGH : report.state == HomingState::ARRIVED;
+  if (task.structure_stored || !learnt)
   {
     return false;
   }
