@@ -163,9 +163,8 @@ TYPED_TEST_P(DriverCases, GivesUpInTime)
 
 TYPED_TEST_P(DriverCases, KeepsLimitsThatPeopleChangeWhileItDrives)
 {
-  using Clock = std::chrono::steady_clock;
   constexpr double SLOW = 0.002;  // [m/s]
-  constexpr std::chrono::duration<double> AT_ONCE(0.1 * SLOWDOWN);
+  constexpr std::chrono::milliseconds AT_ONCE(static_cast<int>(100.0 * SLOWDOWN));
   this->drive();
   const std::string service = this->ns_ + "/" + TypeParam::DRIVER + "/set_parameters";
   const auto set = [&](double max_speed) {
@@ -178,7 +177,7 @@ TYPED_TEST_P(DriverCases, KeepsLimitsThatPeopleChangeWhileItDrives)
     return change.response.config.doubles.empty() ? 0.0 : change.response.config.doubles[0].value;
   };
   EXPECT_EQ(set(SLOW), SLOW);
-  const auto changed = Clock::now() + std::chrono::duration_cast<Clock::duration>(AT_ONCE);
+  const auto changed = std::chrono::steady_clock::now() + AT_ONCE;
   EXPECT_TRUE(waitUntil([&] { return this->commands_.lastMotionAfter(changed) > 0.2; })) << this->reason();
   EXPECT_LE(this->commands_.fastestAfter(changed), SLOW * (1.0 + 1e-9));
   const double most = set(1e9);
