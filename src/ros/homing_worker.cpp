@@ -43,6 +43,7 @@ LearntView loadLearntView(const ViewStore& store, const std::string& name)
 bool storeStructure(const ViewStore& store, const HomingOutcome& outcome)
 {
   constexpr double FAR_ENOUGH = 0.3;  // [m]
+  constexpr std::size_t ENOUGH = 30;  // points of a lesson
   HomingTask& task = *outcome.task;
   const HomingReport& report = outcome.report;
   const bool learnt =
@@ -51,8 +52,12 @@ bool storeStructure(const ViewStore& store, const HomingOutcome& outcome)
   {
     return false;
   }
-  task.structure_stored = true;
   const ViewStructure structure = task.homing->structure();
+  if (task.lesson && structure.points.size() < ENOUGH)
+  {
+    return false;
+  }
+  task.structure_stored = true;
   try
   {
     if (!structure.points.empty() && store.saveStructure(task.view, task.revision, structure))

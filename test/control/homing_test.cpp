@@ -908,7 +908,7 @@ TEST(ServoHoming, ForgetsPointsThatAreNotSeenAtTheView)
   {
     const cv::Rect place(cv::Point2d(at.x() - 20.0, at.y() - 20.0), cv::Size(41, 41));
     test::texturedPicture(33, place.size()).copyTo(target.image(place));
-    target.structure.points.push_back({ at, 1.0 / 1.8, 0.02 });
+    target.structure.points.push_back({ at, 1.0 / 1.8, 0.003 });
   }
   const auto moved = [&gone](const StructurePoint& point) {
     return std::any_of(gone.begin(), gone.end(),

@@ -4,6 +4,7 @@
 /** @file A view that is saved with learn: true is learnt while the base is driven away from it, and used by the next goal. */
 #include "node_test.h"
 
+#include "view_servo/Heading.h"
 #include "view_servo/SaveView.h"
 #include "view_servo/WantedView.h"
 #include "view_servo/geometry/planar_pose.h"
@@ -66,6 +67,7 @@ protected:
   ros::NodeHandle nh_;
   Recorder<nav_msgs::Odometry> odometry_{ "odom" };
   Recorder<sensor_msgs::Image> images_{ "camera/image_raw" };
+  Recorder<Heading> headings_{ "heading" };
   Recorder<WantedView> wanted_{ "homing/wanted_view" };
   Recorder<geometry_msgs::PoseWithCovarianceStamped> view_pose_{ "view_pose" };
   ros::Publisher commands_ = nh_.advertise<geometry_msgs::Twist>("cmd_vel", 1);
@@ -83,6 +85,7 @@ TEST_F(LearningTest, LearnsAViewWhileTheBaseIsDrivenAway)
   ASSERT_TRUE(waitUntil([this] { return wanted_.last() && wanted_.last()->view == "learnt"; }));
   EXPECT_TRUE(wanted_.last()->goal.empty());
   EXPECT_EQ(pointsLearnt(), 0U);
+  ASSERT_TRUE(waitUntil([this] { return headings_.last() && headings_.last()->state != Heading::ACQUIRING; }));
 
   ASSERT_TRUE(driveBack(0.4));
   EXPECT_TRUE(waitUntil([this] { return pointsLearnt() >= 30; })) << pointsLearnt();

@@ -169,7 +169,7 @@ public:
   /**
    * What is known of where the things are that the view shows, to be stored with it: once the view's points are tracked
    * and the distance is known in metres, else without points. Points of an earlier structure that are not seen any more
-   * where the base has arrived count less from one time to the next, and are forgotten after the third.
+   * where the base has arrived count less from one time to the next, until they are forgotten.
    */
   virtual ViewStructure structure() const
   {

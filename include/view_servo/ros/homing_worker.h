@@ -62,8 +62,8 @@ struct HomingOutcome
 
 /**
  * Stores, once, what a task has learnt of its view: when the base has arrived, and in a lesson when it is 0.3 m away from
- * the view and knows that in metres. That storing failed is a warning. Takes as long as a disk does: only for the
- * worker's thread.
+ * the view, knows that in metres, and has learnt 30 points. That storing failed is a warning. Takes as long as a disk
+ * does: only for the worker's thread.
  * @return whether it was tried now.
  */
 bool storeStructure(const ViewStore& store, const HomingOutcome& outcome);
