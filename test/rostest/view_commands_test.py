@@ -1,0 +1,374 @@
+#!/usr/bin/python3
+# Copyright (c) 2026, the view_servo authors
+# SPDX-License-Identifier: BSD-3-Clause
+"""
+The program `view` against view_store and a simulated base that homes, and against peers that hang, have died, or do not do what
+they are asked: each time it has to end in time, with the right status and a line that says what the matter is.
+"""
+import contextlib
+import importlib.machinery
+import importlib.util
+import io
+import json
+import os
+import re
+import signal
+import socket
+import subprocess
+import sys
+import threading
+import time
+import unittest
+import xmlrpc.client
+
+ROOT = os.path.realpath(os.path.join(os.path.dirname(os.path.abspath(__file__)), "..", ".."))
+sys.path.insert(0, os.path.join(ROOT, "test", "docs"))
+import graph  # noqa: E402
+
+import actionlib  # noqa: E402
+import PIL.Image  # noqa: E402
+import rospy  # noqa: E402
+from geometry_msgs.msg import PoseStamped  # noqa: E402
+from std_srvs.srv import SetBool, SetBoolResponse  # noqa: E402
+from view_servo.msg import HomeToViewAction, HomeToViewResult, ServoStatus, ServoToViewAction, ServoToViewResult  # noqa: E402
+
+sys.dont_write_bytecode = True
+loader = importlib.machinery.SourceFileLoader("view", os.path.join(ROOT, "scripts", "view"))
+program = importlib.util.module_from_spec(importlib.util.spec_from_loader("view", loader))
+loader.exec_module(program)
+
+PATIENCE = 60.0 * graph.SLOWDOWN  # for one command [s]
+VIEW = os.path.join(os.environ["CMAKE_PREFIX_PATH"].split(":")[0], "lib", "view_servo", "view")
+DONE, NOT_DONE, CANNOT = 0, 1, 2
+
+
+class Peer:
+    """A port on which somebody listens and never says a word; or, `closed`, nobody listens."""
+
+    def __init__(self, closed=False):
+        self.socket = socket.socket()
+        self.socket.bind(("localhost", 0))
+        self.port = self.socket.getsockname()[1]
+        if not closed:
+            self.socket.listen(10)
+
+
+class Driver:
+    """A driver in this process. What it does with goals is `behaviour`."""
+
+    def __init__(self, action, action_type, result_type, service):
+        self.behaviour = "arrive"
+        self.enabled = None
+        self.goals = []
+        self.came = threading.Event()
+        self._result_type = result_type
+        self.server = actionlib.ActionServer(action, action_type, self._take, self._cancel, auto_start=False)
+        self.server.start()
+        self.service = rospy.Service(service, SetBool, self._enable)
+        self.status = rospy.Publisher("status", ServoStatus, queue_size=10, latch=True)
+
+    def _enable(self, request):
+        self.enabled = request.data
+        return SetBoolResponse(True, "enabled" if request.data else "disabled")
+
+    def _take(self, handle):
+        handle.set_accepted()
+        self.goals.append(handle.get_goal())
+        if self.behaviour == "arrive":
+            handle.set_succeeded(self._result_type(success=True, message="the views agree"))
+        elif self.behaviour == "refuse":
+            handle.set_aborted(self._result_type(success=False, message="disabled: call ~enable first"))
+        self.came.set()
+
+    def _cancel(self, handle):
+        if self.behaviour != "deaf":
+            handle.set_canceled(self._result_type(success=False, message="the goal was cancelled"))
+
+
+class ViewCommands(graph.GraphTest):
+    @classmethod
+    def setUpClass(cls):
+        super().setUpClass()
+        # The simulated base has a namespace of its own; the first one is for view_store and drivers that are made up.
+        for arguments in (["nomad_sim.launch"], ["homing.launch", "sim:=false"]):
+            cls.graph.start("env", "ROS_NAMESPACE=/base", "roslaunch", "view_servo", *arguments)
+        cls.views = os.path.join(cls.directory, "views")
+        cls.graph.start("rosrun", "view_servo", "view_store", "_views_dir:=" + cls.views)
+        PIL.Image.linear_gradient("L").save(os.path.join(cls.directory, "ramp.png"))
+        cls.pose = None
+        cls.subscriber = rospy.Subscriber("/base/ground_truth", PoseStamped, cls.take_pose)
+        node = rospy.get_name()
+        # One goes by the names that launch files give, the other's service by its node's.
+        cls.homing = Driver("home", HomeToViewAction, HomeToViewResult, "homing/enable")
+        cls.arm = Driver("arm1/servo", ServoToViewAction, ServoToViewResult, node + "/enable")
+        cls.hanging, cls.dead = Peer(), Peer(closed=True)
+        for peer, space in ((cls.hanging, "/hanging"), (cls.dead, "/dead")):
+            for service in ("view_store/list", "homing/enable"):
+                uri = "localhost:%d" % peer.port
+                cls.graph.master.registerService(space + "/peer", space + "/" + service, "rosrpc://" + uri, "http://" + uri)
+        try:
+            for service in ("/view_store/list", "/base/view_store/save", "/base/homing/enable", "/base/nomad_sim/set_pose"):
+                graph.wait_until(service, lambda: service in cls.graph.state()[2])  # pylint: disable=cell-var-from-loop
+        except AssertionError as error:
+            raise AssertionError("%s\n%s" % (error, cls.graph.log()))
+
+    @classmethod
+    def tearDownClass(cls):
+        cls.subscriber.unregister()
+        super().tearDownClass()
+
+    @classmethod
+    def take_pose(cls, message):
+        cls.pose = message.pose.position
+
+    def setUp(self):
+        for driver in (self.homing, self.arm):
+            driver.behaviour, driver.enabled = "arrive", None
+            driver.goals.clear()
+            driver.came.clear()
+
+    def begin(self, *words, **environment):
+        """Starts `view`."""
+        return subprocess.Popen([VIEW] + list(words), cwd=self.directory, env=dict(self.graph.environment, **environment),
+                                stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.PIPE,
+                                universal_newlines=True, preexec_fn=graph.end_with_parent)
+
+    def end(self, process, status, complaint=None):
+        """Waits for its end. @return what it printed on standard output; on standard error has to be one line, or nothing."""
+        out, err = process.communicate(timeout=PATIENCE)
+        self.assertEqual(process.returncode, status, out + err)
+        self.check_complaint(err, complaint)
+        return out
+
+    def check_complaint(self, err, complaint):
+        if complaint is None:
+            self.assertEqual(err, "")
+        else:
+            self.assertRegex(err, complaint)
+            self.assertEqual(err.count("\n"), 1, err)
+            self.assertTrue(err.startswith("view: "), err)
+
+    def view_here(self, words, status=DONE, complaint=None):
+        """Like view(), in this process, which takes no time."""
+        out, err = io.StringIO(), io.StringIO()
+        before = os.getcwd()
+        os.chdir(self.directory)
+        try:
+            with contextlib.redirect_stdout(out), contextlib.redirect_stderr(err):
+                self.assertEqual(program.run(["view"] + words.split()), status, err.getvalue() + out.getvalue())
+        finally:
+            os.chdir(before)
+        self.check_complaint(err.getvalue(), complaint)
+        return out.getvalue()
+
+    def view(self, words, status=DONE, complaint=None, **environment):
+        return self.end(self.begin(*words.split(), **environment), status, complaint)
+
+    def test_views(self):
+        self.assertIn("no views", self.view_here("list"))
+        self.assertEqual(self.view_here("list --names"), "")
+        self.assertIn("saved view 'ramp', 256 x 256", self.view_here("save ramp --file ramp.png"))
+        self.view_here("save ramp --file ramp.png", NOT_DONE, "there is one of that name; --overwrite replaces it")
+        self.view_here("save ramp --file ramp.png --overwrite --roi 1 2 30 40")
+        self.view_here("save ramp2 --file missing.png", NOT_DONE, "%s/missing.png" % re.escape(self.directory))
+        self.view_here("save bad/name --file ramp.png", NOT_DONE, "a name is")
+        self.view_here("save broken --file ramp.png")
+        with open(os.path.join(self.views, "broken.yaml"), "a") as file:
+            file.write("garbage\n")
+        lines = self.view_here("list").split("\n")
+        self.assertEqual([line.split()[0] for line in lines if line], ["NAME", "ramp", "broken"])
+        self.assertRegex(lines[1], r"^ramp +- +256 x 256 +no$")
+        self.assertRegex(lines[2], r"^broken is damaged: .*checksum")
+        self.assertEqual(self.view_here("list --names"), "broken\nramp\n")
+        known = json.loads(self.view_here("list --json"))
+        self.assertEqual(known["views"], [{"name": "ramp", "stamp": None, "age": None, "width": 256, "height": 256,
+                                           "calibrated": False, "roi": [1, 2, 30, 40], "pose_frame": None}])
+        self.assertEqual([view["name"] for view in known["damaged"]], ["broken"])
+        self.assertIn("x 1, y 2, width 30, height 40", self.view_here("show ramp --out copy.png"))
+        with PIL.Image.open(os.path.join(self.directory, "copy.png")) as copy:
+            self.assertEqual(copy.tobytes(), PIL.Image.linear_gradient("L").tobytes())
+        self.view_here("show ramp --out there/is/none.png", CANNOT, "none.png cannot be written: No such file or directory")
+        self.view_here("show ramp --out copy.what", CANNOT, "ends with .png")
+        self.view_here("show broken", NOT_DONE, "checksum")
+        self.view_here("show nothing", NOT_DONE, "none of that name")
+        self.assertIn("deleted view 'broken'", self.view_here("delete broken"))
+        self.view_here("delete broken", NOT_DONE, "none of that name")
+
+    def test_other_names(self):
+        self.assertIn("NAME", "NAME" + self.view("list view_store:=/view_store", ROS_NAMESPACE="/robot1"))
+        self.view("list", CANNOT, "there is no /robot1/view_store/list; there is one in / and in .*: set", ROS_NAMESPACE="/robot1")
+        self.view("list __ns:=/robot2", CANNOT, "there is no /robot2/view_store/list;")
+
+    def test_nobody_answers(self):
+        """All at once: they wait most of the time."""
+        none, silent = "http://localhost:%d" % Peer(closed=True).port, Peer()
+        master = "http://localhost:%d" % silent.port
+        runs = []
+        begin = time.monotonic()
+        for command in ("list", "save x", "show x", "delete x", "go x", "stop", "watch"):
+            runs.append((command, self.begin(*command.split(), ROS_MASTER_URI=none), "there is no ROS master at %s" % none))
+        for command in ("list", "go x", "stop"):
+            runs.append((command, self.begin(*command.split(), "--patience", "0.5", ROS_MASTER_URI=master), "does not answer"))
+        runs += [
+            ("no URI", self.begin("list", ROS_MASTER_URI="localhost"), "set it to http://HOST:11311"),
+            ("hanging list", self.begin("list", "--patience", "0.5", "__ns:=/hanging"),
+             "/hanging/view_store/list does not answer within 0.5 s"),
+            ("dead list", self.begin("list", "__ns:=/dead"), "/dead/view_store/list cannot be called"),
+            ("no driver", self.begin("go", "x", "__ns:=/empty"),
+             "nobody serves the actions /empty/home and /empty/servo; there is one in /.* and in /base: set ROS_NAMESPACE=/"),
+            ("no driver", self.begin("stop", "__ns:=/empty"), "no driver runs"),
+            ("no driver", self.begin("watch", "--patience", "0.5", "__ns:=/empty"), "no driver runs"),
+            ("no view_store", self.begin("list", "__ns:=/empty"), "there is no /empty/view_store/list; there is one in /"),
+        ]
+        for name, process, complaint in runs:
+            with self.subTest(name=name, complaint=complaint):
+                self.end(process, CANNOT, complaint)
+        self.assertLess(time.monotonic() - begin, 30.0 * graph.SLOWDOWN)
+
+    def test_interrupted_while_waiting(self):
+        process = self.begin("list", "--patience", "600", "__ns:=/hanging")
+        connection, _ = self.hanging.socket.accept()
+        with contextlib.closing(connection):
+            process.send_signal(signal.SIGINT)
+            self.end(process, NOT_DONE, "interrupted")
+
+    def test_go(self):
+        out = self.view("go dock --timeout 7 --enable")
+        self.assertIn("asking %s to drive to 'dock'" % rospy.get_name(), out)
+        self.assertIn("arrived: the views agree", out)
+        self.assertEqual([(goal.view, goal.timeout) for goal in self.homing.goals], [("dock", 7.0)])
+        self.assertEqual((self.homing.enabled, self.arm.enabled, self.arm.goals), (True, None, []))
+        self.view("go shelf servo:=arm1/servo --driver servo_25d")
+        self.assertEqual(([goal.view for goal in self.arm.goals], self.arm.enabled), (["shelf"], None))
+        self.homing.behaviour = "refuse"
+        self.view("go dock", NOT_DONE, "the gate of .* is closed.*; type: view go dock --enable")
+        self.assertEqual(self.homing.enabled, True)
+        self.view("go dock servo:=arm1/servo", CANNOT, "add --driver homing or --driver servo_25d")
+        self.view("go dock --driver servo_25d", CANNOT, "servo_25d does not run here, but")
+
+    def test_cancelled(self):
+        self.homing.behaviour = "drive"
+        for number in (signal.SIGINT, signal.SIGHUP):
+            self.homing.came.clear()
+            process = self.begin("go", "dock")
+            self.assertTrue(self.homing.came.wait(PATIENCE))
+            process.send_signal(number)
+            self.assertIn("waiting until the robot stands", self.end(process, NOT_DONE, "not arrived: the goal was cancelled"))
+
+    def test_nobody_reads(self):
+        """Of a goal whose progress nobody can see any more the end is wanted."""
+        self.homing.behaviour = "drive"
+        process = self.begin("go", "dock")
+        self.assertTrue(self.homing.came.wait(PATIENCE))
+        process.stdout.close()
+        ended = lambda: not self.homing.server.status_list or all(  # noqa: E731
+            tracker.status.status not in (0, 1) for tracker in self.homing.server.status_list)
+        self.assertFalse(ended())
+        stamp = rospy.Time.now()
+        graph.wait_until("the end", lambda: self.homing.status.publish(ServoStatus(state=int(time.monotonic()) % 5)) or ended())
+        self.assertEqual(process.wait(PATIENCE), NOT_DONE)
+        process.stderr.close()
+        self.assertLess((rospy.Time.now() - stamp).to_sec(), PATIENCE)
+
+    def test_deaf(self):
+        """Drivers that talk, but do not end goals."""
+        self.homing.behaviour = "deaf"
+        runs = [(self.begin("go", "dock", "--timeout", "0.1"), "has not ended the goal within its timeout of 0.1 s")]
+        self.assertTrue(self.homing.came.wait(PATIENCE))
+        self.homing.came.clear()
+        runs.append((self.begin("go", "dock"), "has not ended the cancelled goal within"))
+        self.assertTrue(self.homing.came.wait(PATIENCE))
+        runs[-1][0].send_signal(signal.SIGINT)
+        for process, complaint in runs:
+            self.end(process, NOT_DONE, complaint + ".*; use|" + complaint)
+        # Disabled it is, which is what counts.
+        out = self.view("stop --patience 1")
+        self.assertIn("disabled; whether a goal is left is not known", out)
+        self.assertEqual(self.homing.enabled, False)
+        for tracker in self.homing.server.status_list:
+            tracker.status.status = 4
+
+    def test_stop(self):
+        self.homing.behaviour = self.arm.behaviour = "drive"
+        runs = [self.begin("go", "dock"), self.begin("go", "shelf", "servo:=arm1/servo", "--driver", "servo_25d")]
+        for driver in (self.homing, self.arm):
+            self.assertTrue(driver.came.wait(PATIENCE))
+        out = self.view("stop servo:=arm1/servo")
+        self.assertEqual(out.count("disabled; no goal is left"), 2, out)
+        self.assertEqual((self.homing.enabled, self.arm.enabled), (False, False))
+        for process in runs:
+            self.end(process, NOT_DONE, "not arrived: the goal was cancelled")
+        for space, cause in (("/hanging", "does not answer within"), ("/dead", "cannot be called")):
+            process = self.begin("stop", "--patience", "0.5", "__ns:=" + space)
+            out, err = process.communicate(timeout=PATIENCE)
+            self.assertEqual((process.returncode, out), (CANNOT, ""), err)
+            self.assertRegex(err, r"^%s/peer: %s/homing/enable %s.*\nview: not reached: .*emergency stop\n$" % (space, space, cause))
+        # One is reached, the other not.
+        process = self.begin("stop", "--patience", "0.5", "servo:=/arm1/servo", "__ns:=/hanging")
+        out, err = process.communicate(timeout=PATIENCE)
+        self.assertEqual(process.returncode, NOT_DONE, out + err)
+        self.assertIn("no goal is left", out)
+        self.assertIn("not reached", err)
+
+    def test_watch(self):
+        process = self.begin("watch")
+        for state, reason in ((ServoStatus.ACQUIRING, "looks"), (ServoStatus.ACQUIRING, "looks"), (ServoStatus.LOST, "covered")):
+            graph.wait_until("a listener", lambda: self.homing.status.get_num_connections() > 0)
+            self.homing.status.publish(ServoStatus(state=state, reason=reason))
+        lines = [process.stdout.readline() for _ in range(2)]
+        while "lost" not in lines[-1]:  # what other tests have said
+            lines.append(process.stdout.readline())
+        self.assertRegex(lines[-2], r"^\d\d:\d\d:\d\d  %s: acquiring: looks$" % rospy.get_name())
+        self.assertRegex(lines[-1], "lost: covered$")
+        process.send_signal(signal.SIGINT)
+        self.assertEqual(self.end(process, DONE), "")
+
+    def move(self, x):
+        status, text = self.graph.run("rosservice call /base/nomad_sim/set_pose '{pose: {position: {x: %g}, orientation: {w: 1.0}}}'" % x)
+        self.assertEqual(status, 0, text)
+        graph.wait_until("a pose", lambda: self.pose is not None and abs(self.pose.x - self.goal.x - x) < 0.05)
+
+    def pid_of_homing(self):
+        return xmlrpc.client.ServerProxy(self.graph.master.lookupNode(graph.CALLER, "/base/homing")[2]).getPid(graph.CALLER)[2]
+
+    def drive(self):
+        """A `view go` that drives."""
+        process = self.begin("go", "dock", "--enable", "--patience", "2", "__ns:=/base")
+        line = ""
+        while "servoing" not in line:
+            line = process.stdout.readline()
+            self.assertNotEqual(line, "", "it ended before it drove")
+        return process
+
+    def test_drive(self):
+        self.assertIn("saved view 'dock', 640 x 480, with its pose in odom", self.view("save dock __ns:=/base"))
+        self.assertRegex(self.view("list __ns:=/base"), r"dock +\d+ s +640 x 480 +yes")
+        graph.wait_until("a pose", lambda: self.pose is not None)
+        type(self).goal = self.pose
+        self.move(-0.3)
+        watch = self.begin("watch", "__ns:=/base")
+        self.assertIn("disabled", watch.stdout.readline())
+        self.view("go dock __ns:=/base", NOT_DONE, "the gate of /base/homing is closed")
+        if graph.SLOWDOWN == 1.0:  # what is built with sanitizers is too slow for images in real time
+            out = self.view("go dock --enable --timeout 60 __ns:=/base")
+            self.assertRegex(out, r"servoing; 0\.\d\d\d m, .* to go")
+            self.assertIn("arrived", out)
+            self.assertLess(abs(self.pose.x - self.goal.x), 0.01)
+            self.move(-0.6)
+            process = self.drive()
+            self.assertIn("disabled; no goal is left", self.view("stop __ns:=/base"))
+            self.end(process, NOT_DONE, "not arrived: ")
+            process = self.drive()
+            pid = self.pid_of_homing()
+            os.kill(pid, signal.SIGSTOP)
+            self.end(process, NOT_DONE, "/base/homing has been silent for 2 s.*emergency stop")
+            os.kill(pid, signal.SIGCONT)
+            process = self.drive()
+            os.kill(pid, signal.SIGKILL)
+            self.end(process, NOT_DONE, "/base/homing has gone")
+        watch.send_signal(signal.SIGINT)
+        self.assertIn("/base/homing: disabled: ", self.end(watch, DONE))
+
+
+if __name__ == "__main__":
+    unittest.main(verbosity=2)
