@@ -71,6 +71,7 @@ class Documented(unittest.TestCase):
     """Holds what all tests share: running nodes and their files."""
 
     maxDiff = None
+    ARM_VIEWS = {"shelf"}  # which the documents give to an arm; other views are a base's
 
     @classmethod
     def setUpClass(cls):
@@ -293,6 +294,9 @@ class Documented(unittest.TestCase):
         if program == "check_robot":
             self.try_check_robot(arguments)
             return
+        if program == "view":
+            self.try_view(arguments)
+            return
         if set(arguments) & {"...", "NAME", "name=value"} or arguments[-1].startswith("-") and len(arguments) > 1:
             options = [word for word in arguments if word.startswith("-")]  # a form: its options have to be there
             subcommand = [word for word in arguments[:1] if word in ("points", "lines")]
@@ -319,6 +323,27 @@ class Documented(unittest.TestCase):
         running = self.graphs[1 if "arm_servo" in arguments else 0]
         status, text = running.run(" ".join(["rosrun view_servo check_robot --seconds 2", *arguments]), PATIENCE)
         self.assertIn(status, (0, 1), text)
+
+    def try_view(self, arguments):
+        """Against the running nodes; a form, such as one with NAME, has commands and options that --help knows."""
+        command = "rosrun view_servo view "
+        commands = arguments[0].split("|")
+        if len(commands) > 1 or "NAME" in arguments or "--help" in arguments:
+            known = self.run_here(command + "--help")
+            for name in commands:
+                self.assertIn(("    %s " if name.isalpha() else "%s") % name, known)
+            if len(arguments) > 1:
+                known = self.run_here(command + commands[0] + " --help")
+                for option in arguments[1:]:
+                    self.assertIn(option, known)
+            return
+        arms = self.ARM_VIEWS & set(arguments)
+        if commands[0] == "watch":  # until somebody interrupts it
+            command = "timeout --preserve-status --signal=INT 5 " + command
+        status, text = self.graphs[1 if arms else 0].run(command + " ".join(map(shlex.quote, arguments)), PATIENCE)
+        self.assertEqual(status, 0, text)
+        said = {"go": "arrived", "watch": "/homing: ", "stop": "disabled; no goal is left", "list": "dock"}
+        self.assertIn(said.get(commands[0], ""), text)
 
     def record_run(self, bag):
         """Records what homing tells during a goal, until that has ended."""
@@ -487,7 +512,7 @@ class Documented(unittest.TestCase):
         last_parts = {name.split("/")[-1] for name in known}
         sources = "".join(self.source_files().values())
         worlds = tuple(glob.glob(os.path.join(ROOT, "config", "worlds", "*.yaml")))
-        for path in worlds + ("CMakeLists.txt", "src/CMakeLists.txt", "test/CMakeLists.txt", "package.xml", "scripts/plot_run",
+        for path in worlds + ("CMakeLists.txt", "src/CMakeLists.txt", "test/CMakeLists.txt", "package.xml", "scripts/plot_run", "scripts/view",
                               "test/rostest/node_test.h"):
             sources += self.read(path)
         words = set(re.findall(r"\w+", sources.replace("${PROJECT_NAME}", PACKAGE)))
