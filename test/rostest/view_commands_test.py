@@ -225,6 +225,12 @@ class ViewCommands(graph.GraphTest):
                 self.end(process, CANNOT, complaint)
         self.assertLess(time.monotonic() - begin, 30.0 * graph.SLOWDOWN)
 
+    def test_pick_view_without_a_window(self):
+        for display in ("", ":4711"):
+            status, text = self.graph.run("DISPLAY=%s WAYLAND_DISPLAY= rosrun view_servo pick_view dock" % display)
+            self.assertEqual(status, CANNOT, text)
+            self.assertRegex(text, "^pick_view: no window can be opened on display '%s': .*view save NAME --roi[^\n]*\n$" % display)
+
     def test_interrupted_while_waiting(self):
         process = self.begin("list", "--patience", "600", "__ns:=/hanging")
         connection, _ = self.hanging.socket.accept()
