@@ -19,6 +19,7 @@ import sys
 import threading
 import time
 import unittest
+import unittest.mock
 import xmlrpc.client
 
 ROOT = os.path.realpath(os.path.join(os.path.dirname(os.path.abspath(__file__)), "..", ".."))
@@ -148,13 +149,13 @@ class ViewCommands(graph.GraphTest):
             self.assertEqual(err.count("\n"), 1, err)
             self.assertTrue(err.startswith("view: "), err)
 
-    def view_here(self, words, status=DONE, complaint=None):
-        """Like view(), in this process, which takes no time."""
+    def view_here(self, words, status=DONE, complaint=None, **environment):
+        """Like view(), in this process, which takes no time; not for what has to become a node."""
         out, err = io.StringIO(), io.StringIO()
         before = os.getcwd()
         os.chdir(self.directory)
         try:
-            with contextlib.redirect_stdout(out), contextlib.redirect_stderr(err):
+            with unittest.mock.patch.dict(os.environ, environment), contextlib.redirect_stdout(out), contextlib.redirect_stderr(err):
                 self.assertEqual(program.run(["view"] + words.split()), status, err.getvalue() + out.getvalue())
         finally:
             os.chdir(before)
@@ -195,34 +196,28 @@ class ViewCommands(graph.GraphTest):
         self.view_here("delete broken", NOT_DONE, "none of that name")
 
     def test_other_names(self):
-        self.assertIn("NAME", "NAME" + self.view("list view_store:=/view_store", ROS_NAMESPACE="/robot1"))
-        self.view("list", CANNOT, "there is no /robot1/view_store/list; there is one in / and in .*: set", ROS_NAMESPACE="/robot1")
+        self.view_here("list view_store:=/view_store", ROS_NAMESPACE="/robot1")
+        self.view_here("list", CANNOT, "there is no /robot1/view_store/list; there is one in / and in .*: set", ROS_NAMESPACE="/robot1")
         self.view("list __ns:=/robot2", CANNOT, "there is no /robot2/view_store/list;")
 
     def test_nobody_answers(self):
-        """All at once: they wait most of the time."""
-        none, silent = "http://localhost:%d" % Peer(closed=True).port, Peer()
-        master = "http://localhost:%d" % silent.port
-        runs = []
         begin = time.monotonic()
+        none, silent = "http://localhost:%d" % Peer(closed=True).port, Peer()
+        watch = self.begin("watch", "--patience", "0.5", "__ns:=/empty")
         for command in ("list", "save x", "show x", "delete x", "go x", "stop", "watch"):
-            runs.append((command, self.begin(*command.split(), ROS_MASTER_URI=none), "there is no ROS master at %s" % none))
+            self.view_here(command, CANNOT, "there is no ROS master at %s" % none, ROS_MASTER_URI=none)
         for command in ("list", "go x", "stop"):
-            runs.append((command, self.begin(*command.split(), "--patience", "0.5", ROS_MASTER_URI=master), "does not answer"))
-        runs += [
-            ("no URI", self.begin("list", ROS_MASTER_URI="localhost"), "set it to http://HOST:11311"),
-            ("hanging list", self.begin("list", "--patience", "0.5", "__ns:=/hanging"),
-             "/hanging/view_store/list does not answer within 0.5 s"),
-            ("dead list", self.begin("list", "__ns:=/dead"), "/dead/view_store/list cannot be called"),
-            ("no driver", self.begin("go", "x", "__ns:=/empty"),
-             "nobody serves the actions /empty/home and /empty/servo; there is one in /.* and in /base: set ROS_NAMESPACE=/"),
-            ("no driver", self.begin("stop", "__ns:=/empty"), "no driver runs"),
-            ("no driver", self.begin("watch", "--patience", "0.5", "__ns:=/empty"), "no driver runs"),
-            ("no view_store", self.begin("list", "__ns:=/empty"), "there is no /empty/view_store/list; there is one in /"),
-        ]
-        for name, process, complaint in runs:
-            with self.subTest(name=name, complaint=complaint):
-                self.end(process, CANNOT, complaint)
+            self.view_here(command + " --patience 0.3", CANNOT, "does not answer",
+                           ROS_MASTER_URI="http://localhost:%d" % silent.port)
+        self.view_here("list", CANNOT, "set it to http://HOST:11311", ROS_MASTER_URI="localhost")
+        for command, space, complaint in (
+                ("list --patience 0.3", "/hanging", "/hanging/view_store/list does not answer within 0.3 s"),
+                ("list", "/dead", "/dead/view_store/list cannot be called"),
+                ("go x", "/empty", "nobody serves the actions /empty/home and /empty/servo; there is one in /.* and in /base: set"),
+                ("stop", "/empty", "no driver runs"),
+                ("list", "/empty", "there is no /empty/view_store/list; there is one in /")):
+            self.view_here(command, CANNOT, complaint, ROS_NAMESPACE=space)
+        self.end(watch, CANNOT, "no driver runs")
         self.assertLess(time.monotonic() - begin, 30.0 * graph.SLOWDOWN)
 
     def test_pick_view_without_a_window(self):
@@ -348,7 +343,7 @@ class ViewCommands(graph.GraphTest):
 
     def test_drive(self):
         self.assertIn("saved view 'dock', 640 x 480, with its pose in odom", self.view("save dock __ns:=/base"))
-        self.assertRegex(self.view("list __ns:=/base"), r"dock +\d+ s +640 x 480 +yes")
+        self.assertRegex(self.view_here("list", ROS_NAMESPACE="/base"), r"dock +\d+ s +640 x 480 +yes")
         graph.wait_until("a pose", lambda: self.pose is not None)
         type(self).goal = self.pose
         self.move(-0.3)
