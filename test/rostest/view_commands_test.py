@@ -155,7 +155,8 @@ class ViewCommands(graph.GraphTest):
         before = os.getcwd()
         os.chdir(self.directory)
         try:
-            with unittest.mock.patch.dict(os.environ, environment), contextlib.redirect_stdout(out), contextlib.redirect_stderr(err):
+            with unittest.mock.patch.dict(os.environ, environment), contextlib.redirect_stdout(out), \
+                    contextlib.redirect_stderr(err):
                 self.assertEqual(program.run(["view"] + words.split()), status, err.getvalue() + out.getvalue())
         finally:
             os.chdir(before)
@@ -197,7 +198,8 @@ class ViewCommands(graph.GraphTest):
 
     def test_other_names(self):
         self.view_here("list view_store:=/view_store", ROS_NAMESPACE="/robot1")
-        self.view_here("list", CANNOT, "there is no /robot1/view_store/list; there is one in / and in .*: set", ROS_NAMESPACE="/robot1")
+        self.view_here("list", CANNOT, "there is no /robot1/view_store/list; there is one in / and in .*: set",
+                       ROS_NAMESPACE="/robot1")
         self.view("list __ns:=/robot2", CANNOT, "there is no /robot2/view_store/list;")
 
     def test_nobody_answers(self):
@@ -303,7 +305,8 @@ class ViewCommands(graph.GraphTest):
             process = self.begin("stop", "--patience", "0.5", "__ns:=" + space)
             out, err = process.communicate(timeout=PATIENCE)
             self.assertEqual((process.returncode, out), (CANNOT, ""), err)
-            self.assertRegex(err, r"^%s/peer: %s/homing/enable %s.*\nview: not reached: .*emergency stop\n$" % (space, space, cause))
+            self.assertRegex(err, r"^%s/peer: %s/homing/enable %s.*\nview: not reached: .*emergency stop\n$" %
+                             (space, space, cause))
         # One is reached, the other not.
         process = self.begin("stop", "--patience", "0.5", "servo:=/arm1/servo", "__ns:=/hanging")
         out, err = process.communicate(timeout=PATIENCE)
@@ -325,7 +328,8 @@ class ViewCommands(graph.GraphTest):
         self.assertEqual(self.end(process, DONE), "")
 
     def move(self, x):
-        status, text = self.graph.run("rosservice call /base/nomad_sim/set_pose '{pose: {position: {x: %g}, orientation: {w: 1.0}}}'" % x)
+        pose = "{pose: {position: {x: %g}, orientation: {w: 1.0}}}" % x
+        status, text = self.graph.run("rosservice call /base/nomad_sim/set_pose '%s'" % pose)
         self.assertEqual(status, 0, text)
         graph.wait_until("a pose", lambda: self.pose is not None and abs(self.pose.x - self.goal.x - x) < 0.05)
 
