@@ -30,7 +30,7 @@ _view_servo_view()
   fi
   case $command in
     list) options+=" --json --names" ;;
-    save) options+=" --overwrite --roi --file" ;;
+    save) options+=" --overwrite --learn --roi --file" ;;
     show) options+=" --out" ;;
     go) options+=" --timeout --enable --driver" ;;
     delete | stop | watch) ;;
