@@ -508,6 +508,49 @@ std::string whatIsFound(const ViewMatch& result, GeometryModel asked)
          " planes agree with one fundamental matrix";
 }
 
+/** Segments; mirrored ones are matched as well, because that is asked of lines and points together. */
+ViewMatch matchLines(const PreparedImage& reference, const PreparedImage& current, LineMatcherParams params)
+{
+  params.refuse_mirrored = false;
+  return LineViewMatcher(params).match(reference, current, GeometryModel::FUNDAMENTAL);
+}
+
+/** Corners; none are sought along one geometry, because their matches would speak for that geometry. */
+ViewMatch matchPoints(const PreparedImage& reference, const PreparedImage& current, PointViewMatcherParams params,
+                      const std::function<bool()>& enough)
+{
+  params.guided = false;
+  params.refuse_mirrored = false;
+  return PointViewMatcher(params).match(reference, current, GeometryModel::FUNDAMENTAL, 0.0, enough);
+}
+
+/** Tries the planes that the line matcher has found, and those on which matches of corners agree. */
+void addPlanes(const ViewMatch& lines, const ViewMatch& points, double threshold, Rng& rng, Attempt& attempt)
+{
+  for (std::size_t i = 0; i < lines.planes.size(); ++i)
+  {
+    attempt.addPlane(lines.planes[i], static_cast<int>(i));
+  }
+  for (const Eigen::Matrix3d& h : planesOf(positions(points.matches), threshold, rng))
+  {
+    attempt.addPlane(h, -1);
+  }
+}
+
+/** Says why nothing is found. */
+void explainNoGeometry(const PreparedImage& reference, const PreparedImage& current, const ViewMatch& lines,
+                       const ViewMatch& points, ViewMatch& result)
+{
+  if (points.outcome == MatchOutcome::TOO_FEW_FEATURES && lines.outcome == MatchOutcome::TOO_FEW_FEATURES)
+  {
+    result.outcome = MatchOutcome::TOO_FEW_FEATURES;
+    result.message = points.message + "; " + lines.message;
+    return;
+  }
+  result.message = "no geometry found: the " + std::to_string(result.matches.size()) +
+                   " candidate matches do not support one better than chance would" + exposureNote(reference, current);
+}
+
 }  // namespace
 
 SceneMatcherParams::SceneMatcherParams()
@@ -562,21 +605,14 @@ ViewMatch SceneMatcher::match(const PreparedImage& reference, const PreparedImag
   result.model = model;
   StageClock clock(result.stages);
 
-  LineMatcherParams line_params = params_.lines;
-  line_params.refuse_mirrored = false;  // that is asked of all together
-  const ViewMatch lines = LineViewMatcher(line_params).match(reference, current, GeometryModel::FUNDAMENTAL);
+  const ViewMatch lines = matchLines(reference, current, params_.lines);
   clock.finish("lines");
   // Other scales are for where nothing else is.
   int trials = 0;
   const auto enough = [&] {
     return (given_up && given_up()) || (!lines.planes.empty() && ++trials > 2);
   };
-  // Matches that were sought along one geometry would speak for that geometry.
-  PointViewMatcherParams point_params = params_.points;
-  point_params.guided = false;
-  point_params.refuse_mirrored = false;
-  const ViewMatch points =
-      PointViewMatcher(point_params).match(reference, current, GeometryModel::FUNDAMENTAL, 0.0, enough);
+  const ViewMatch points = matchPoints(reference, current, params_.points, enough);
   clock.finish("points");
   if (given_up && given_up())
   {
@@ -586,15 +622,8 @@ ViewMatch SceneMatcher::match(const PreparedImage& reference, const PreparedImag
   }
 
   Attempt attempt(reference, current, params_);
-  for (std::size_t i = 0; i < lines.planes.size(); ++i)
-  {
-    attempt.addPlane(lines.planes[i], static_cast<int>(i));
-  }
   Rng rng(params_.seed);
-  for (const Eigen::Matrix3d& h : planesOf(positions(points.matches), params_.points.ransac.inlier_threshold, rng))
-  {
-    attempt.addPlane(h, -1);
-  }
+  addPlanes(lines, points, params_.points.ransac.inlier_threshold, rng, attempt);
   clock.finish("planes");
   attempt.collect(lines.matches, points.matches);
   const bool points_agree = points.outcome == MatchOutcome::MATCHED;
@@ -627,16 +656,9 @@ ViewMatch SceneMatcher::match(const PreparedImage& reference, const PreparedImag
   {
     result.message = repeated ? REPEATED : MIRRORED;
   }
-  else if (points.outcome == MatchOutcome::TOO_FEW_FEATURES && lines.outcome == MatchOutcome::TOO_FEW_FEATURES)
-  {
-    result.outcome = MatchOutcome::TOO_FEW_FEATURES;
-    result.message = points.message + "; " + lines.message;
-  }
   else
   {
-    result.message = "no geometry found: the " + std::to_string(result.matches.size()) +
-                     " candidate matches do not support one better than chance would" +
-                     exposureNote(reference, current);
+    explainNoGeometry(reference, current, lines, points, result);
   }
   result.elapsed_ms = clock.total();
   return result;
