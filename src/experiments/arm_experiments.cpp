@@ -94,20 +94,31 @@ Eigen::Isometry3d startOf(const Run& run, const sim::World& world)
          Eigen::AngleAxisd(turn.norm(), turn.normalized());
 }
 
-}  // namespace
-
-void runArmExperiment(const ExperimentContext& context, std::ostream& csv)
+/** How a run ended. */
+struct Result
 {
-  constexpr double NEAR_ENOUGH = 0.005;              // [m]: what says converged and is further off is wrong
-  constexpr double STRAIGHT_ENOUGH = 0.5 / DEGREES;  // [rad]
-  const int runs_each = context.runsOf(ARM_RUNS);
-  std::ifstream urdf_file = openForReading(packageFolder() / "urdf" / "puma560.urdf");
-  const std::string urdf{ std::istreambuf_iterator<char>(urdf_file), std::istreambuf_iterator<char>() };
+  Eigen::Isometry3d way;  ///< from the goal to the start
+  sim::ArmOutcome outcome;
+  double least_margin;  ///< of the chosen point from the image's border [px]
+};
+
+std::map<std::string, sim::World> readWorlds()
+{
   std::map<std::string, sim::World> worlds;
-  std::vector<Run> runs;
   for (const char* world : WORLDS)
   {
     worlds.emplace(world, sim::findWorld(world, packageFolder() / "config" / "worlds"));
+  }
+  return worlds;
+}
+
+/** All runs, those from the same start beside each other. */
+std::vector<Run> runsOf(const ExperimentContext& context)
+{
+  const int runs_each = context.runsOf(ARM_RUNS);
+  std::vector<Run> runs;
+  for (const char* world : WORLDS)
+  {
     for (const char* start : STARTS)
     {
       for (int i = 0; i < runs_each; ++i)
@@ -116,54 +127,58 @@ void runArmExperiment(const ExperimentContext& context, std::ostream& csv)
       }
     }
   }
+  return runs;
+}
 
-  std::vector<std::string> lines(runs.size());
-  std::map<std::string, Row> table;
-  std::mutex mutex;
-  std::size_t done = 0;
-  inParallel(runs.size(), context.threads, [&](std::size_t i) {
-    const Run& run = runs[i];
-    const sim::World& world = worlds.at(run.world);
-    const Eigen::Isometry3d start = startOf(run, world);
-    const Eigen::Isometry3d way = world.goal.inverse() * start;
-    sim::ArmTrials trials(world, urdf, paramsOf(run, world));
-    double least_margin = world.camera.width;  // of the chosen point from the image's border [px]
-    const sim::ArmOutcome outcome = trials.run(start, [&](const sim::ArmStep& step) {
-      const Eigen::Vector2d& point = step.report.point;
-      if (point.allFinite())
-      {
-        least_margin = std::min({ least_margin, point.x(), point.y(), world.camera.width - 1.0 - point.x(),
-                                  world.camera.height - 1.0 - point.y() });
-      }
-    });
-    std::string reason = outcome.reason;
-    std::replace(reason.begin(), reason.end(), ',', ';');
-    std::ostringstream line;
-    line << run.world << ',' << run.start << ',' << run.index << ',' << (run.other_light ? "other" : "same") << ','
-         << 1e3 * way.translation().norm() << ',' << DEGREES * Eigen::AngleAxisd(way.linear()).angle() << ','
-         << (outcome.converged ? 1 : 0) << ',' << 1e3 * outcome.translation_error << ','
-         << DEGREES * outcome.rotation_error << ',' << outcome.duration << ',' << least_margin << ',' << reason << '\n';
-    const std::lock_guard<std::mutex> lock(mutex);
-    lines[i] = line.str();
-    std::cerr << ++done << " of " << runs.size() << ": " << lines[i] << std::flush;
-    Row& row = table[run.world + " " + run.start];
-    ++row.runs;
-    if (!outcome.converged)
+Result servo(const Run& run, const sim::World& world, const std::string& urdf)
+{
+  const Eigen::Isometry3d start = startOf(run, world);
+  sim::ArmTrials trials(world, urdf, paramsOf(run, world));
+  double least_margin = world.camera.width;
+  const sim::ArmOutcome outcome = trials.run(start, [&](const sim::ArmStep& step) {
+    const Eigen::Vector2d& point = step.report.point;
+    if (point.allFinite())
     {
-      ++row.failures;
-      return;
+      least_margin = std::min({ least_margin, point.x(), point.y(), world.camera.width - 1.0 - point.x(),
+                                world.camera.height - 1.0 - point.y() });
     }
-    row.wrong += outcome.translation_error > NEAR_ENOUGH || outcome.rotation_error > STRAIGHT_ENOUGH ? 1 : 0;
-    row.millimetres.push_back(1e3 * outcome.translation_error);
-    row.degrees.push_back(DEGREES * outcome.rotation_error);
   });
+  return { world.goal.inverse() * start, outcome, least_margin };
+}
 
-  csv << "world,start,index,light,start_distance_mm,start_turn_deg,converged,translation_error_mm,rotation_error_deg,"
-         "duration_s,least_margin_px,reason\n";
-  for (const std::string& line : lines)
+/** A line of the table, with its end. */
+std::string lineOf(const Run& run, const Result& result)
+{
+  const sim::ArmOutcome& outcome = result.outcome;
+  std::string reason = outcome.reason;
+  std::replace(reason.begin(), reason.end(), ',', ';');
+  std::ostringstream line;
+  line << run.world << ',' << run.start << ',' << run.index << ',' << (run.other_light ? "other" : "same") << ','
+       << 1e3 * result.way.translation().norm() << ',' << DEGREES * Eigen::AngleAxisd(result.way.linear()).angle()
+       << ',' << (outcome.converged ? 1 : 0) << ',' << 1e3 * outcome.translation_error << ','
+       << DEGREES * outcome.rotation_error << ',' << outcome.duration << ',' << result.least_margin << ',' << reason
+       << '\n';
+  return line.str();
+}
+
+void add(const sim::ArmOutcome& outcome, Row& row)
+{
+  constexpr double NEAR_ENOUGH = 0.005;              // [m]: what says converged and is further off is wrong
+  constexpr double STRAIGHT_ENOUGH = 0.5 / DEGREES;  // [rad]
+  ++row.runs;
+  if (!outcome.converged)
   {
-    csv << line;
+    ++row.failures;
+    return;
   }
+  row.wrong += outcome.translation_error > NEAR_ENOUGH || outcome.rotation_error > STRAIGHT_ENOUGH ? 1 : 0;
+  row.millimetres.push_back(1e3 * outcome.translation_error);
+  row.degrees.push_back(DEGREES * outcome.rotation_error);
+}
+
+/** @param table a row for each world and start, named "WORLD START". */
+void print(std::map<std::string, Row>& table)
+{
   std::printf("%-14s %8s %6s %9s %6s %9s %6s\n", "", "failures", "wrong", "pos [mm]", "std", "ang [deg]", "std");
   for (const char* world : WORLDS)
   {
@@ -179,6 +194,36 @@ void runArmExperiment(const ExperimentContext& context, std::ostream& csv)
                   mean(row.millimetres), deviation(row.millimetres), mean(row.degrees), deviation(row.degrees));
     }
   }
+}
+
+}  // namespace
+
+void runArmExperiment(const ExperimentContext& context, std::ostream& csv)
+{
+  std::ifstream urdf_file = openForReading(packageFolder() / "urdf" / "puma560.urdf");
+  const std::string urdf{ std::istreambuf_iterator<char>(urdf_file), std::istreambuf_iterator<char>() };
+  const std::map<std::string, sim::World> worlds = readWorlds();
+  const std::vector<Run> runs = runsOf(context);
+  std::vector<std::string> lines(runs.size());
+  std::map<std::string, Row> table;
+  std::mutex mutex;
+  std::size_t done = 0;
+  inParallel(runs.size(), context.threads, [&](std::size_t i) {
+    const Run& run = runs[i];
+    const Result result = servo(run, worlds.at(run.world), urdf);
+    const std::lock_guard<std::mutex> lock(mutex);
+    lines[i] = lineOf(run, result);
+    std::cerr << ++done << " of " << runs.size() << ": " << lines[i] << std::flush;
+    add(result.outcome, table[run.world + " " + run.start]);
+  });
+
+  csv << "world,start,index,light,start_distance_mm,start_turn_deg,converged,translation_error_mm,rotation_error_deg,"
+         "duration_s,least_margin_px,reason\n";
+  for (const std::string& line : lines)
+  {
+    csv << line;
+  }
+  print(table);
 }
 
 }  // namespace view_servo

@@ -155,89 +155,110 @@ bool plot(const fs::path& csv, const fs::path& png)
   return std::system(command.c_str()) == 0;  // NOLINT(cert-env33-c): of our own package, paths quoted
 }
 
-}  // namespace
-
-int main(int argc, char** argv)
+/** What the command line asks for. */
+struct Request
 {
-  std::string name;
+  std::string name;  ///< of the experiment; empty: none is named
   std::string out = ".";
   bool list = false;
-  std::optional<int> runs;
   ExperimentContext context;
+};
+
+/** Empty when only help was asked for, which is printed then. @throws std::exception when an option is wrong. */
+std::optional<Request> readRequest(int argc, char** argv)
+{
+  Request request;
+  std::optional<int> runs;
   CommandLine line("Runs the thesis' experiments and writes tables and plots: experiments NAME [OPTIONS]",
                    "Exit status: 0 the table and its plot were written, 1 the table alone, 2 bad input.");
-  line.text("out", out, "Folder for NAME.csv and NAME.png, made when it does not exist; default: here");
-  line.flag("short", context.brief, "A small part of it, to see that it works");
+  line.text("out", request.out, "Folder for NAME.csv and NAME.png, made when it does not exist; default: here");
+  line.flag("short", request.context.brief, "A small part of it, to see that it works");
   line.number("runs", runs, { 1.0, 1e6 }, "How often to repeat what --list says is repeated");
-  line.number("seed", context.seed, {}, "From which all random numbers are drawn");
-  line.number("threads", context.threads, { 0.0, 1024.0 }, "At most so many; 0: as many as there are processors");
-  line.flag("list", list, "Names the experiments, with their runs and seeds");
-  try
+  line.number("seed", request.context.seed, {}, "From which all random numbers are drawn");
+  line.number("threads", request.context.threads, { 0.0, 1024.0 },
+              "At most so many; 0: as many as there are processors");
+  line.flag("list", request.list, "Names the experiments, with their runs and seeds");
+  const std::optional<std::vector<std::string>> words = line.parse(argc, argv);
+  if (!words)
   {
-    const std::optional<std::vector<std::string>> words = line.parse(argc, argv);
-    if (!words)
-    {
-      return 0;  // --help
-    }
-    if (words->size() > 1)
-    {
-      throw std::runtime_error("'" + (*words)[1] + "' is one word too many; see --help");
-    }
-    context.runs = runs.value_or(0);
-    name = words->empty() ? "" : words->front();
+    return std::nullopt;
   }
-  catch (const std::exception& error)
+  if (words->size() > 1)
   {
-    std::cerr << oneLine(error) << std::endl;
-    return 2;
+    throw std::runtime_error("'" + (*words)[1] + "' is one word too many; see --help");
   }
-  if (list)
-  {
-    for (const Experiment& experiment : experiments())
-    {
-      std::cout << describe(experiment) << std::endl;
-    }
-    return 0;
-  }
+  request.context.runs = runs.value_or(0);
+  request.name = words->empty() ? "" : words->front();
+  return request;
+}
+
+/** @throws std::invalid_argument when there is none of this name. */
+const Experiment& findExperiment(const std::string& name)
+{
   const auto found = std::find_if(experiments().begin(), experiments().end(),
                                   [&](const Experiment& experiment) { return experiment.name == name; });
   if (found == experiments().end())
   {
-    std::cerr << (name.empty() ? "name an experiment" : "there is no experiment '" + name + "'") << "; see --list"
-              << std::endl;
-    return 2;
+    throw std::invalid_argument((name.empty() ? "name an experiment" : "there is no experiment '" + name + "'") +
+                                "; see --list");
   }
+  return *found;
+}
+
+/** Writes the table and its plot. @returns the exit status. @throws std::exception when there is no table. */
+int run(const Experiment& experiment, ExperimentContext context, const fs::path& out)
+{
+  refuseUselessOptions(experiment, context);
+  if (experiment.needs_data)
+  {
+    const auto data = dataFolder();
+    if (!data)
+    {
+      return 2;
+    }
+    context.data = *data;
+  }
+  fs::create_directories(out);
+  const fs::path csv = out / (experiment.name + ".csv");
+  const fs::path png = out / (experiment.name + ".png");
+  std::ofstream stream(csv);
+  if (!stream)
+  {
+    throw std::runtime_error("cannot write " + csv.string());
+  }
+  printRepetition(experiment, context);
+  experiment.run(context, stream);
+  stream.close();
+  std::cout << csv.string() << std::endl;
+  if (!plot(csv, png))
+  {
+    std::cerr << "the table is there, but could not be drawn" << std::endl;
+    return 1;
+  }
+  std::cout << png.string() << std::endl;
+  return 0;
+}
+
+}  // namespace
+
+int main(int argc, char** argv)
+{
   try
   {
-    refuseUselessOptions(*found, context);
-    if (found->needs_data)
+    const std::optional<Request> request = readRequest(argc, argv);
+    if (!request)
     {
-      const auto data = dataFolder();
-      if (!data)
+      return 0;  // --help
+    }
+    if (request->list)
+    {
+      for (const Experiment& experiment : experiments())
       {
-        return 2;
+        std::cout << describe(experiment) << std::endl;
       }
-      context.data = *data;
+      return 0;
     }
-    fs::create_directories(out);
-    const fs::path csv = fs::path(out) / (name + ".csv");
-    const fs::path png = fs::path(out) / (name + ".png");
-    std::ofstream stream(csv);
-    if (!stream)
-    {
-      throw std::runtime_error("cannot write " + csv.string());
-    }
-    printRepetition(*found, context);
-    found->run(context, stream);
-    stream.close();
-    std::cout << csv.string() << std::endl;
-    if (!plot(csv, png))
-    {
-      std::cerr << "the table is there, but could not be drawn" << std::endl;
-      return 1;
-    }
-    std::cout << png.string() << std::endl;
-    return 0;
+    return run(findExperiment(request->name), request->context, request->out);
   }
   catch (const std::exception& error)
   {

@@ -22,6 +22,7 @@
 #include <algorithm>
 #include <chrono>
 #include <cmath>
+#include <filesystem>
 #include <iostream>
 #include <limits>
 #include <map>
@@ -344,17 +345,18 @@ void runMultiHypothesisExperiment(const ExperimentContext& context, std::ostream
 
 // ------------------------------------------------------------------------------------------------------ real pairs
 
-void runRealPairsExperiment(const ExperimentContext& context, std::ostream& csv)
+namespace
 {
-  constexpr double THRESHOLD = 2.0;          // [px]
-  constexpr double VIEW_CONSISTENCY = 0.03;  // as ViewConsistencyParams
-  const int runs = context.runsOf(REAL_PAIR_RUNS);
-  struct Images
-  {
-    std::string folder;
-    std::string name;
-    GeometryModel model;
-  };
+/** Names two images of the data. */
+struct Images
+{
+  std::string folder;
+  std::string name;
+  GeometryModel model;
+};
+
+std::vector<Images> realPairs(bool brief)
+{
   std::vector<Images> all;
   for (const std::string& name : kusvodPairs())
   {
@@ -367,37 +369,109 @@ void runRealPairsExperiment(const ExperimentContext& context, std::ostream& csv)
       all.push_back({ "adelaidermf", name, model });
     }
   }
-  if (context.brief)
+  if (brief)
   {
     all.resize(1);
   }
-  csv << "pair,model,algorithm,iterations,runs,candidates,candidates_correct,matches,correct,error_px,ms\n";
-  for (const Images& images : all)
+  return all;
+}
+
+/** What is known of two images: one for each plane or motion. */
+std::vector<PointPair> readTruths(const std::filesystem::path& data, const Images& images)
+{
+  return images.folder == "kusvod2" ? std::vector<PointPair>{ readKusvodPair(data, images.name) }
+                                    : readAdelaidePairs(data, images.model, images.name);
+}
+
+/** Corners of two images, associated as the point matcher does. */
+Problem associate(const PointPair& pair)
+{
+  const PointMatcherParams params;
+  const PointFeatures reference = extractPointFeatures(pair.reference, params);
+  const PointFeatures current = extractPointFeatures(pair.current, params);
+  Problem problem;
+  for (const Corner& corner : reference.corners)
   {
-    const std::vector<PointPair> truths =  // one for each plane or motion
-        images.folder == "kusvod2" ? std::vector<PointPair>{ readKusvodPair(context.data, images.name) }
-                                   : readAdelaidePairs(context.data, images.model, images.name);
-    const PointPair& first = truths.front();
-    const PointMatcherParams params;
-    const PointFeatures reference = extractPointFeatures(first.reference, params);
-    const PointFeatures current = extractPointFeatures(first.current, params);
-    Problem problem;
-    for (const Corner& corner : reference.corners)
-    {
-      problem.reference.push_back(corner.position);
-    }
-    for (const Corner& corner : current.corners)
-    {
-      problem.current.push_back(corner.position);
-    }
-    problem.association = associatePoints(reference, ProfileIndex(reference.profiles), current, params);
-    const Correspondences candidates = pairsOf(
-        problem, maximumWeightMatching(problem.association.strongestOfRows(MultiHypothesisParams().entries_per_row)));
-    int most_correct = 0;
+    problem.reference.push_back(corner.position);
+  }
+  for (const Corner& corner : current.corners)
+  {
+    problem.current.push_back(corner.position);
+  }
+  problem.association = associatePoints(reference, ProfileIndex(reference.profiles), current, params);
+  return problem;
+}
+
+/** The most that are correct for one plane or motion. */
+int mostCorrect(const std::vector<PointPair>& truths, const Correspondences& candidates)
+{
+  int most = 0;
+  for (const PointPair& truth : truths)
+  {
+    most = std::max(most, truth.countCorrect(candidates));
+  }
+  return most;
+}
+
+Settings settingsFor(Algorithm algorithm, GeometryModel model, bool brief)
+{
+  constexpr double VIEW_CONSISTENCY = 0.03;  // as ViewConsistencyParams
+  Settings settings{ algorithm, model };
+  settings.threshold = 2.0;
+  settings.sampling = Sampling::PROGRESSIVE;  // as the point matcher
+  settings.view_consistency = model == GeometryModel::FUNDAMENTAL ? VIEW_CONSISTENCY : 0.0;
+  settings.improvement = algorithm == Algorithm::IMPORTANCE;
+  settings.iterations = algorithm == Algorithm::IMPORTANCE && !brief ? 20000 : 2000;
+  return settings;
+}
+
+/** What each run of an algorithm on two images found. */
+struct Outcomes
+{
+  std::vector<double> matches;
+  std::vector<double> correct;
+  std::vector<double> error;  ///< [px]
+  std::vector<double> ms;
+};
+
+Outcomes runAll(const ExperimentContext& context, const std::vector<PointPair>& truths, const Problem& problem,
+                const Settings& settings)
+{
+  const std::vector<double> zeros(static_cast<std::size_t>(context.runsOf(REAL_PAIR_RUNS)));
+  Outcomes outcomes{ zeros, zeros, zeros, zeros };
+  inParallel(zeros.size(), context.threads, [&](std::size_t i) {
+    Rng rng(context.seedOf(REAL_PAIR_RUNS, i + 1));
+    const Estimate estimate = run(problem, settings, rng);
+    const Correspondences found = pairsOf(problem, estimate.matches);
+    // Of several planes or motions, the one that was found.
+    outcomes.error[i] = NOT_A_NUMBER;
     for (const PointPair& truth : truths)
     {
-      most_correct = std::max(most_correct, truth.countCorrect(candidates));
+      const double candidate = truth.geometryError(settings.model, estimate.matrix);
+      if (!(candidate >= outcomes.error[i]))
+      {
+        outcomes.error[i] = candidate;
+        outcomes.correct[i] = truth.countCorrect(found);
+      }
     }
+    outcomes.matches[i] = static_cast<double>(found.size());
+    outcomes.ms[i] = estimate.ms;
+  });
+  return outcomes;
+}
+
+}  // namespace
+
+void runRealPairsExperiment(const ExperimentContext& context, std::ostream& csv)
+{
+  csv << "pair,model,algorithm,iterations,runs,candidates,candidates_correct,matches,correct,error_px,ms\n";
+  for (const Images& images : realPairs(context.brief))
+  {
+    const std::vector<PointPair> truths = readTruths(context.data, images);
+    const Problem problem = associate(truths.front());
+    const Correspondences candidates = pairsOf(
+        problem, maximumWeightMatching(problem.association.strongestOfRows(MultiHypothesisParams().entries_per_row)));
+    const int most_correct = mostCorrect(truths, candidates);
     for (const Algorithm algorithm :
          { Algorithm::MAGSAC, Algorithm::RANSAC, Algorithm::MODIFIED, Algorithm::WEIGHTED, Algorithm::IMPORTANCE })
     {
@@ -405,41 +479,15 @@ void runRealPairsExperiment(const ExperimentContext& context, std::ostream& csv)
       {
         continue;
       }
-      Settings settings{ algorithm, images.model };
-      settings.threshold = THRESHOLD;
-      settings.sampling = Sampling::PROGRESSIVE;  // as the point matcher
-      settings.view_consistency = images.model == GeometryModel::FUNDAMENTAL ? VIEW_CONSISTENCY : 0.0;
-      settings.improvement = algorithm == Algorithm::IMPORTANCE;
-      settings.iterations = algorithm == Algorithm::IMPORTANCE && !context.brief ? 20000 : 2000;
-      std::vector<double> matches(static_cast<std::size_t>(runs));
-      std::vector<double> correct = matches;
-      std::vector<double> error = matches;
-      std::vector<double> ms = matches;
-      inParallel(matches.size(), context.threads, [&](std::size_t i) {
-        Rng rng(context.seedOf(REAL_PAIR_RUNS, i + 1));
-        const Estimate estimate = run(problem, settings, rng);
-        const Correspondences found = pairsOf(problem, estimate.matches);
-        // Of several planes or motions, the one that was found.
-        error[i] = NOT_A_NUMBER;
-        for (const PointPair& truth : truths)
-        {
-          const double candidate = truth.geometryError(images.model, estimate.matrix);
-          if (!(candidate >= error[i]))
-          {
-            error[i] = candidate;
-            correct[i] = truth.countCorrect(found);
-          }
-        }
-        matches[i] = static_cast<double>(found.size());
-        ms[i] = estimate.ms;
-      });
+      const Settings settings = settingsFor(algorithm, images.model, context.brief);
+      const Outcomes outcomes = runAll(context, truths, problem, settings);
       csv << images.folder << '/' << images.name << ',' << (images.model == GeometryModel::FUNDAMENTAL ? "F" : "H")
-          << ',' << nameOf(algorithm) << ',' << settings.iterations << ',' << runs << ',' << candidates.size() << ','
-          << most_correct << ',' << medianOf(matches) << ',' << medianOf(correct) << ',' << medianOf(error) << ','
-          << medianOf(ms) << '\n';
-      std::cerr << images.folder << '/' << images.name << ", " << nameOf(algorithm) << ": " << medianOf(correct)
-                << " correct of " << medianOf(matches) << ", error " << medianOf(error) << " px, " << medianOf(ms)
-                << " ms" << std::endl;
+          << ',' << nameOf(algorithm) << ',' << settings.iterations << ',' << outcomes.ms.size() << ','
+          << candidates.size() << ',' << most_correct << ',' << medianOf(outcomes.matches) << ','
+          << medianOf(outcomes.correct) << ',' << medianOf(outcomes.error) << ',' << medianOf(outcomes.ms) << '\n';
+      std::cerr << images.folder << '/' << images.name << ", " << nameOf(algorithm) << ": "
+                << medianOf(outcomes.correct) << " correct of " << medianOf(outcomes.matches) << ", error "
+                << medianOf(outcomes.error) << " px, " << medianOf(outcomes.ms) << " ms" << std::endl;
     }
   }
 }

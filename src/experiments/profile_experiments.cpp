@@ -231,10 +231,10 @@ void runProfileParametersExperiment(const ExperimentContext& context, std::ostre
 
 // --------------------------------------------------------------------------------------------- tables 6.2 and 6.3
 
-void runViewConsistencyExperiment(const ExperimentContext& context, std::ostream& csv)
+namespace
 {
-  constexpr int SAMPLES = 2000;  // as the thesis has them
-  cv::setNumThreads(context.threads > 0 ? context.threads : -1);
+std::vector<PointPair> readConsistencyPairs(const ExperimentContext& context)
+{
   std::vector<PointPair> pairs;
   for (const std::string& name : kusvodPairs())
   {
@@ -247,13 +247,75 @@ void runViewConsistencyExperiment(const ExperimentContext& context, std::ostream
   {
     pairs.push_back(readMertonPoints(context.data, 1, view));
   }
-  const auto runs = static_cast<std::uint64_t>(context.runsOf(VIEW_CONSISTENCY_RUNS));
+  return pairs;
+}
+
+/** What each run on one pair found. */
+struct ConsistencyRuns
+{
+  std::vector<Estimate> plain;   ///< without the constraint
+  std::vector<Estimate> before;  ///< from the candidates that the constraint keeps
+  std::vector<Estimate> within;  ///< from samples that the constraint accepts
+  std::vector<Estimate> same;    ///< without the constraint, as many samples as `within` drew
+  std::vector<double> kept;
+  std::vector<double> kept_correct;
+  std::vector<double> filter_ms;
+  std::vector<double> factors;  ///< time of `same` by that of `within`
+};
+
+void addRun(const PointPair& pair, const Correspondences& candidates, std::uint64_t seed, ConsistencyRuns& runs)
+{
+  constexpr int SAMPLES = 2000;  // as the thesis has them
   const ViewConsistencyParams consistency;
   RansacParams params;
   params.inlier_threshold = 1.0;
   params.sampling = Sampling::UNIFORM;  // so that the same seed draws the same samples with and without the constraint
   params.min_iterations = SAMPLES;
   params.max_iterations = SAMPLES;
+  runs.plain.push_back(estimate(pair, candidates, 0.0, params, seed));
+
+  Rng rng(seed);
+  const auto start = std::chrono::steady_clock::now();
+  const Correspondences consistent = select(candidates, viewConsistentCandidates(candidates, consistency, rng));
+  runs.filter_ms.push_back(std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - start).count());
+  runs.kept.push_back(static_cast<double>(consistent.size()));
+  runs.kept_correct.push_back(pair.countCorrect(consistent));
+  runs.before.push_back(estimate(pair, consistent, 0.0, params, seed));
+
+  runs.within.push_back(estimate(pair, candidates, consistency.threshold, params, seed));
+  const RansacStatistics& statistics = runs.within.back().statistics;
+  RansacParams same_samples = params;
+  same_samples.max_iterations = statistics.iterations + statistics.rejected_samples;
+  same_samples.min_iterations = same_samples.max_iterations;
+  runs.same.push_back(estimate(pair, candidates, 0.0, same_samples, seed));
+  runs.factors.push_back(runs.same.back().ms / runs.within.back().ms);
+}
+
+/** A line of the table but for its first fields, which name the pair and count its candidates. */
+void writeMedians(const ConsistencyRuns& runs, std::ostream& csv)
+{
+  const auto put = [&](const Estimate& found) {
+    csv << found.inliers << ',' << found.correct << ',' << found.error << ',';
+  };
+  put(medians(runs.plain));
+  csv << medians(runs.plain).ms << ',' << medianOf(runs.kept) << ',' << medianOf(runs.kept_correct) << ','
+      << medianOf(runs.filter_ms) << ',';
+  put(medians(runs.before));
+  csv << medians(runs.before).ms << ',';
+  put(medians(runs.within));
+  csv << medians(runs.within).statistics.iterations << ',' << medians(runs.within).statistics.rejected_samples << ','
+      << medians(runs.within).ms << ',';
+  put(medians(runs.same));
+  csv << medians(runs.same).ms << ',' << medianOf(runs.factors) << '\n';
+}
+
+}  // namespace
+
+void runViewConsistencyExperiment(const ExperimentContext& context, std::ostream& csv)
+{
+  cv::setNumThreads(context.threads > 0 ? context.threads : -1);
+  const std::vector<PointPair> pairs = readConsistencyPairs(context);
+  const auto runs = static_cast<std::uint64_t>(context.runsOf(VIEW_CONSISTENCY_RUNS));
   csv << "pair,votes,candidates,correct_candidates,plain_matches,plain_correct,plain_error_px,plain_ms,"
          "kept,kept_correct,filter_ms,before_matches,before_correct,before_error_px,before_ms,"
          "within_matches,within_correct,within_error_px,samples_solved,samples_refused,within_ms,"
@@ -265,52 +327,15 @@ void runViewConsistencyExperiment(const ExperimentContext& context, std::ostream
       PointMatcherParams matching;
       matching.cyclic_order = cyclic;
       const Correspondences candidates = MatchedFeatures(pair, matching).candidates(matching);
-      std::vector<Estimate> plain;
-      std::vector<Estimate> before;
-      std::vector<Estimate> within;
-      std::vector<Estimate> same;
-      std::vector<double> kept;
-      std::vector<double> kept_correct;
-      std::vector<double> filter_ms;
-      std::vector<double> factors;
+      ConsistencyRuns found;
       for (std::uint64_t run = 1; run <= runs; ++run)
       {
-        const std::uint64_t seed = context.seedOf(VIEW_CONSISTENCY_RUNS, run);
-        plain.push_back(estimate(pair, candidates, 0.0, params, seed));
-
-        Rng rng(seed);
-        const auto start = std::chrono::steady_clock::now();
-        const Correspondences consistent = select(candidates, viewConsistentCandidates(candidates, consistency, rng));
-        filter_ms.push_back(
-            std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - start).count());
-        kept.push_back(static_cast<double>(consistent.size()));
-        kept_correct.push_back(pair.countCorrect(consistent));
-        before.push_back(estimate(pair, consistent, 0.0, params, seed));
-
-        within.push_back(estimate(pair, candidates, consistency.threshold, params, seed));
-        const RansacStatistics& statistics = within.back().statistics;
-        RansacParams same_samples = params;
-        same_samples.max_iterations = statistics.iterations + statistics.rejected_samples;
-        same_samples.min_iterations = same_samples.max_iterations;
-        same.push_back(estimate(pair, candidates, 0.0, same_samples, seed));
-        factors.push_back(same.back().ms / within.back().ms);
+        addRun(pair, candidates, context.seedOf(VIEW_CONSISTENCY_RUNS, run), found);
       }
-      const auto put = [&](const Estimate& found) {
-        csv << found.inliers << ',' << found.correct << ',' << found.error << ',';
-      };
       csv << pair.name << ',' << (cyclic ? "cyclic" : "plain") << ',' << candidates.size() << ','
           << pair.countCorrect(candidates) << ',';
-      put(medians(plain));
-      csv << medians(plain).ms << ',' << medianOf(kept) << ',' << medianOf(kept_correct) << ',' << medianOf(filter_ms)
-          << ',';
-      put(medians(before));
-      csv << medians(before).ms << ',';
-      put(medians(within));
-      csv << medians(within).statistics.iterations << ',' << medians(within).statistics.rejected_samples << ','
-          << medians(within).ms << ',';
-      put(medians(same));
-      csv << medians(same).ms << ',' << medianOf(factors) << '\n';
-      std::cerr << pair.name << (cyclic ? ", cyclic order" : ", plain votes") << ": " << medianOf(factors)
+      writeMedians(found, csv);
+      std::cerr << pair.name << (cyclic ? ", cyclic order" : ", plain votes") << ": " << medianOf(found.factors)
                 << " times less time" << std::endl;
     }
   }
