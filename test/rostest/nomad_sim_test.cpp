@@ -1,7 +1,6 @@
 // Copyright (c) 2026, the view_servo authors
 // SPDX-License-Identifier: BSD-3-Clause
-#include "node_test.h"
-#include "sim_ros/robot_messages.h"
+#include "simulation_test.h"
 #include "test_paths.h"
 #include "view_servo/SetLight.h"
 #include "view_servo/SetPose.h"
@@ -10,8 +9,6 @@
 #include <geometry_msgs/PoseStamped.h>
 #include <geometry_msgs/Twist.h>
 #include <nav_msgs/Odometry.h>
-#include <tf2_ros/buffer.h>
-#include <tf2_ros/transform_listener.h>
 
 #include <cmath>
 #include <cstdlib>
@@ -24,32 +21,17 @@ namespace
 {
 using test::waitUntil;
 
-Eigen::Isometry3d toIsometry(const geometry_msgs::Transform& transform)
-{
-  geometry_msgs::Pose pose;
-  pose.position.x = transform.translation.x;
-  pose.position.y = transform.translation.y;
-  pose.position.z = transform.translation.z;
-  pose.orientation = transform.rotation;
-  return sim::toIsometry(pose);
-}
-
-class NomadSim : public testing::Test
+class NomadSimTest : public SimulationTest<nav_msgs::Odometry, geometry_msgs::Twist>
 {
 protected:
-  NomadSim()
-    : odometry_("odom"),
-      truth_("ground_truth"),
-      images_("camera/image_raw"),
-      listener_(tf_),
-      command_(nh_.advertise<geometry_msgs::Twist>("cmd_vel", 1))
+  NomadSimTest() : SimulationTest("odom", ODOM_FRAME)
   {
   }
 
   void SetUp() override
   {
-    ASSERT_TRUE(waitUntil([&] { return images_.last() && truth_.last() && odometry_.last(); }));
-    ASSERT_TRUE(waitUntil([&] { return command_.getNumSubscribers() > 0; }));
+    waitForRobot();
+    ASSERT_FALSE(HasFatalFailure());
     SetPose place;
     place.request.pose = toPose(planarPose(-0.906, 0.423, 0.0));
     ASSERT_TRUE(callService("nomad_sim/set_pose", place) && place.response.success) << place.response.message;
@@ -59,14 +41,8 @@ protected:
 
   double speed() const
   {
-    const geometry_msgs::Twist twist = odometry_.last()->twist.twist;
+    const geometry_msgs::Twist twist = state_.last()->twist.twist;
     return std::hypot(twist.linear.x, twist.linear.y) + std::abs(twist.angular.z);
-  }
-
-  void waitForFreshTruth()
-  {
-    const ros::Time now = ros::Time::now();
-    ASSERT_TRUE(waitUntil([&] { return truth_.last()->header.stamp > now && odometry_.last()->header.stamp > now; }));
   }
 
   void drive(double x, double y, double turn)
@@ -82,32 +58,13 @@ protected:
   void driveFor(double duration, double x, double y, double turn)
   {
     const ros::Time end = ros::Time::now() + ros::Duration(duration);
-    ASSERT_TRUE(waitUntil([&] { return odometry_.last()->header.stamp > end; }, [&] { drive(x, y, turn); }));
+    ASSERT_TRUE(waitUntil([&] { return state_.last()->header.stamp > end; }, [&] { drive(x, y, turn); }));
   }
-
-  /** The camera's pose in `odom`, by tf. */
-  Eigen::Isometry3d cameraByTf(const ros::Time& stamp)
-  {
-    return toIsometry(tf_.lookupTransform(ODOM_FRAME, CAMERA_FRAME, stamp, ros::Duration(2.0)).transform);
-  }
-
-  Eigen::Isometry3d cameraByTruth() const
-  {
-    return sim::toIsometry(truth_.last()->pose);
-  }
-
-  ros::NodeHandle nh_;
-  test::Recorder<nav_msgs::Odometry> odometry_;
-  test::Recorder<geometry_msgs::PoseStamped> truth_;
-  test::Recorder<sensor_msgs::Image> images_;
-  tf2_ros::Buffer tf_;
-  tf2_ros::TransformListener listener_;
-  ros::Publisher command_;
 };
 
 }  // namespace
 
-TEST_F(NomadSim, OdometryTfAndGroundTruthTellOfOneMotion)
+TEST_F(NomadSimTest, OdometryTfAndGroundTruthTellOfOneMotion)
 {
   const geometry_msgs::PoseStamped start = *truth_.last();
   const Eigen::Isometry3d tf_start = cameraByTf(start.header.stamp);
@@ -116,7 +73,7 @@ TEST_F(NomadSim, OdometryTfAndGroundTruthTellOfOneMotion)
       waitUntil([&] { return (cameraByTruth().translation() - from).norm() > 0.25; }, [&] { drive(0.2, -0.1, 0.15); }));
   waitForFreshTruth();
   const geometry_msgs::PoseStamped end = *truth_.last();
-  const Eigen::Isometry3d true_motion = sim::toIsometry(start.pose).inverse() * sim::toIsometry(end.pose);
+  const Eigen::Isometry3d true_motion = toIsometry(start.pose).inverse() * toIsometry(end.pose);
   const Eigen::Isometry3d tf_motion = tf_start.inverse() * cameraByTf(end.header.stamp);
   EXPECT_GT(true_motion.translation().norm(), 0.2);
   EXPECT_LT((true_motion.translation() - tf_motion.translation()).norm(), 0.005);
@@ -128,21 +85,21 @@ TEST_F(NomadSim, OdometryTfAndGroundTruthTellOfOneMotion)
   const Eigen::Vector3d ahead = true_motion.inverse() * Eigen::Vector3d(0.0, 0.0, 10.0);
   EXPECT_GT(ahead.x(), 0.3);
 
-  const nav_msgs::Odometry odometry = *odometry_.last();
+  const nav_msgs::Odometry odometry = *state_.last();
   EXPECT_EQ(odometry.header.frame_id, "odom");
   EXPECT_EQ(odometry.child_frame_id, "base_link");
   EXPECT_EQ(end.header.frame_id, "world");
   EXPECT_EQ(images_.last()->header.frame_id, "camera_optical_frame");
 }
 
-TEST_F(NomadSim, StandsAQuarterOfASecondAfterTheLastCommand)
+TEST_F(NomadSimTest, StandsAQuarterOfASecondAfterTheLastCommand)
 {
   ASSERT_TRUE(waitUntil([&] { return speed() > 0.3; }, [&] { drive(0.4, 0.0, 0.0); }));
   drive(0.4, 0.0, 0.0);
   const ros::WallTime last = ros::WallTime::now();
   ASSERT_TRUE(waitUntil([&] { return speed() == 0.0; }));
   // Its own stamp says when it stood, however late the message came.
-  for (const nav_msgs::Odometry& message : odometry_.messages())
+  for (const nav_msgs::Odometry& message : state_.messages())
   {
     const double after = message.header.stamp.toSec() - last.toSec();
     if (after > 0.25)
@@ -152,7 +109,7 @@ TEST_F(NomadSim, StandsAQuarterOfASecondAfterTheLastCommand)
   }
 }
 
-TEST_F(NomadSim, RefusesCommandsThatAreNotFinite)
+TEST_F(NomadSimTest, RefusesCommandsThatAreNotFinite)
 {
   const Eigen::Isometry3d before = cameraByTruth();
   driveFor(0.5, std::numeric_limits<double>::quiet_NaN(), 0.1, 0.0);
@@ -162,7 +119,7 @@ TEST_F(NomadSim, RefusesCommandsThatAreNotFinite)
                         [&] { drive(0.1, 0.0, 0.0); }));
 }
 
-TEST_F(NomadSim, RefusesPosesInsideFurniture)
+TEST_F(NomadSimTest, RefusesPosesInsideFurniture)
 {
   const Eigen::Isometry3d before = cameraByTruth();
   SetPose place;
@@ -180,7 +137,7 @@ TEST_F(NomadSim, RefusesPosesInsideFurniture)
   EXPECT_TRUE(cameraByTruth().isApprox(before, 1e-12));
 }
 
-TEST_F(NomadSim, LightIsSet)
+TEST_F(NomadSimTest, LightIsSet)
 {
   const auto mean = [&] {
     return cv::mean(toGrey(*images_.last(), "image"))[0];
@@ -203,7 +160,7 @@ TEST_F(NomadSim, LightIsSet)
   EXPECT_TRUE(waitUntil([&] { return std::abs(mean() - before) < 1.0; }));
 }
 
-TEST_F(NomadSim, NodesRefuseBadWorlds)
+TEST_F(NomadSimTest, NodesRefuseBadWorlds)
 {
   const std::string node = NOMAD_SIM_PATH;
   for (const std::string arguments : { " _world:=nowhere", " _world:=desk _start:=nowhere", " _groups:=nothing",

@@ -1,7 +1,6 @@
 // Copyright (c) 2026, the view_servo authors
 // SPDX-License-Identifier: BSD-3-Clause
-#include "node_test.h"
-#include "sim_ros/robot_messages.h"
+#include "simulation_test.h"
 #include "test_paths.h"
 #include "view_servo/SetPose.h"
 #include "view_servo/ros/call_service.h"
@@ -9,8 +8,6 @@
 #include <geometry_msgs/PoseStamped.h>
 #include <geometry_msgs/TwistStamped.h>
 #include <sensor_msgs/JointState.h>
-#include <tf2_ros/buffer.h>
-#include <tf2_ros/transform_listener.h>
 
 #include <algorithm>
 #include <cmath>
@@ -24,22 +21,17 @@ namespace
 {
 using test::waitUntil;
 
-class PumaSim : public testing::Test
+class PumaSimTest : public SimulationTest<sensor_msgs::JointState, geometry_msgs::TwistStamped>
 {
 protected:
-  PumaSim()
-    : joints_("joint_states"),
-      truth_("ground_truth"),
-      images_("camera/image_raw"),
-      listener_(tf_),
-      command_(nh_.advertise<geometry_msgs::TwistStamped>("cmd_vel", 1))
+  PumaSimTest() : SimulationTest("joint_states", BASE_FRAME)
   {
   }
 
   void SetUp() override
   {
-    ASSERT_TRUE(waitUntil([&] { return images_.last() && truth_.last() && joints_.last(); }));
-    ASSERT_TRUE(waitUntil([&] { return command_.getNumSubscribers() > 0; }));
+    waitForRobot();
+    ASSERT_FALSE(HasFatalFailure());
     ASSERT_TRUE(waitUntil([&] { return tf_.canTransform(BASE_FRAME, CAMERA_FRAME, ros::Time(0)); }));
     ASSERT_TRUE(waitUntil([&] { return speed() == 0.0; }));
     waitForFreshTruth();
@@ -48,18 +40,12 @@ protected:
   double speed() const
   {
     double sum = 0.0;
-    const sensor_msgs::JointState joints = *joints_.last();
+    const sensor_msgs::JointState joints = *state_.last();
     for (const double velocity : joints.velocity)
     {
       sum += std::abs(velocity);
     }
     return sum;
-  }
-
-  void waitForFreshTruth()
-  {
-    const ros::Time now = ros::Time::now();
-    ASSERT_TRUE(waitUntil([&] { return truth_.last()->header.stamp > now && joints_.last()->header.stamp > now; }));
   }
 
   void move(const Puma::Twist& twist, const std::string& frame = CAMERA_FRAME)
@@ -79,33 +65,8 @@ protected:
   void moveFor(double duration, const Puma::Twist& twist, const std::string& frame = CAMERA_FRAME)
   {
     const ros::Time end = ros::Time::now() + ros::Duration(duration);
-    ASSERT_TRUE(waitUntil([&] { return joints_.last()->header.stamp > end; }, [&] { move(twist, frame); }));
+    ASSERT_TRUE(waitUntil([&] { return state_.last()->header.stamp > end; }, [&] { move(twist, frame); }));
   }
-
-  Eigen::Isometry3d cameraByTf(const ros::Time& stamp)
-  {
-    const geometry_msgs::Transform transform =
-        tf_.lookupTransform(BASE_FRAME, CAMERA_FRAME, stamp, ros::Duration(2.0)).transform;
-    geometry_msgs::Pose pose;
-    pose.position.x = transform.translation.x;
-    pose.position.y = transform.translation.y;
-    pose.position.z = transform.translation.z;
-    pose.orientation = transform.rotation;
-    return toIsometry(pose);
-  }
-
-  Eigen::Isometry3d cameraByTruth() const
-  {
-    return toIsometry(truth_.last()->pose);
-  }
-
-  ros::NodeHandle nh_;
-  test::Recorder<sensor_msgs::JointState> joints_;
-  test::Recorder<geometry_msgs::PoseStamped> truth_;
-  test::Recorder<sensor_msgs::Image> images_;
-  tf2_ros::Buffer tf_;
-  tf2_ros::TransformListener listener_;
-  ros::Publisher command_;
 };
 
 Puma::Twist twist(double x, double y, double z, double wx, double wy, double wz)
@@ -117,7 +78,7 @@ Puma::Twist twist(double x, double y, double z, double wx, double wy, double wz)
 
 }  // namespace
 
-TEST_F(PumaSim, TfAndGroundTruthTellOfOneMotion)
+TEST_F(PumaSimTest, TfAndGroundTruthTellOfOneMotion)
 {
   const geometry_msgs::PoseStamped start = *truth_.last();
   const Eigen::Isometry3d tf_start = cameraByTf(start.header.stamp);
@@ -137,16 +98,16 @@ TEST_F(PumaSim, TfAndGroundTruthTellOfOneMotion)
   const Eigen::AngleAxisd turn(true_motion.linear());
   EXPECT_GT(turn.angle() * turn.axis().z(), 0.05);
   EXPECT_EQ(images_.last()->header.frame_id, "camera_optical_frame");
-  EXPECT_EQ(joints_.last()->name.size(), 6U);
+  EXPECT_EQ(state_.last()->name.size(), 6U);
 }
 
-TEST_F(PumaSim, StandsAQuarterOfASecondAfterTheLastCommand)
+TEST_F(PumaSimTest, StandsAQuarterOfASecondAfterTheLastCommand)
 {
   ASSERT_TRUE(waitUntil([&] { return speed() > 0.05; }, [&] { move(twist(0.0, 0.0, -0.05, 0.0, 0.0, 0.2)); }));
   move(twist(0.0, 0.0, -0.05, 0.0, 0.0, 0.2));
   const ros::WallTime last = ros::WallTime::now();
   ASSERT_TRUE(waitUntil([&] { return speed() == 0.0; }));
-  for (const sensor_msgs::JointState& message : joints_.messages())
+  for (const sensor_msgs::JointState& message : state_.messages())
   {
     const double after = message.header.stamp.toSec() - last.toSec();
     if (after > 0.25)
@@ -157,7 +118,7 @@ TEST_F(PumaSim, StandsAQuarterOfASecondAfterTheLastCommand)
   }
 }
 
-TEST_F(PumaSim, RefusesCommandsThatAreNotFiniteOrInAnotherFrame)
+TEST_F(PumaSimTest, RefusesCommandsThatAreNotFiniteOrInAnotherFrame)
 {
   const Eigen::Isometry3d before = cameraByTruth();
   moveFor(0.4, twist(std::numeric_limits<double>::quiet_NaN(), 0.0, 0.0, 0.0, 0.0, 0.1));
@@ -166,7 +127,7 @@ TEST_F(PumaSim, RefusesCommandsThatAreNotFiniteOrInAnotherFrame)
   EXPECT_TRUE(cameraByTruth().isApprox(before, 1e-9));
 }
 
-TEST_F(PumaSim, GoesToPosesWithinReachOnly)
+TEST_F(PumaSimTest, GoesToPosesWithinReachOnly)
 {
   const Eigen::Isometry3d before = cameraByTruth();
   Eigen::Isometry3d near = before;
@@ -185,7 +146,7 @@ TEST_F(PumaSim, GoesToPosesWithinReachOnly)
   EXPECT_TRUE(cameraByTruth().isApprox(near, 1e-5));
 }
 
-TEST_F(PumaSim, NodesRefuseBadParameters)
+TEST_F(PumaSimTest, NodesRefuseBadParameters)
 {
   const std::string node = PUMA_SIM_PATH;
   for (const std::string arguments :
