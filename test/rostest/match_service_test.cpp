@@ -1,14 +1,10 @@
 // Copyright (c) 2026, the view_servo authors
 // SPDX-License-Identifier: BSD-3-Clause
-#include "node_test.h"
-#include "support/temporary_directory.h"
+#include "matcher_test.h"
 
 #include "view_servo/MatchPoints.h"
-#include "view_servo/ros/call_service.h"
-#include "view_servo/views/view_store.h"
 
 #include <gtest/gtest.h>
-#include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
 
 #include <cmath>
@@ -28,32 +24,25 @@ namespace
 namespace enc = sensor_msgs::image_encodings;
 
 /** The nodes of match_service.test: one that has everything, one with ~allow_paths false. */
-const std::string MATCH = "open/point_matcher/match";
+const std::string NODE = "open/point_matcher";
 const std::string MATCH_WITHOUT_PATHS = "strict/point_matcher/match";
 
-class MatchServiceTest : public ::testing::Test
+class MatchServiceTest : public MatcherTest<MatchPoints>
 {
 protected:
   static void SetUpTestSuite()
   {
-    ASSERT_TRUE(waitForService(MATCH));
+    ASSERT_TRUE(waitForService(NODE + "/match"));
     ASSERT_TRUE(waitForService(MATCH_WITHOUT_PATHS));
   }
 
   static void TearDownTestSuite()
   {
-    removeViews("open/point_matcher");
+    removeViews(NODE);
   }
 
-  MatchServiceTest() : picture_(texturedPicture(1)), seen_(warped(picture_, exampleHomography()))
+  MatchServiceTest() : MatcherTest(NODE, texturedPicture(1), warped(texturedPicture(1), exampleHomography()))
   {
-  }
-
-  std::string file(const std::string& name, const cv::Mat& image) const
-  {
-    const std::string path = (directory_.path() / name).string();
-    EXPECT_TRUE(cv::imwrite(path, image)) << path;
-    return path;
   }
 
   std::string textFile(const std::string& name, const std::string& text) const
@@ -61,22 +50,6 @@ protected:
     const std::string path = (directory_.path() / name).string();
     std::ofstream(path) << text;
     return path;
-  }
-
-  MatchPoints::Request goodRequest() const
-  {
-    MatchPoints::Request request;
-    request.reference.image = toMono8(picture_);
-    request.query.image = toMono8(seen_);
-    return request;
-  }
-
-  static MatchPoints::Response call(const MatchPoints::Request& request, const std::string& service = MATCH)
-  {
-    MatchPoints::Request copy = request;
-    MatchPoints::Response response;
-    EXPECT_TRUE(callService(service, copy, response)) << "the node did not answer";
-    return response;
   }
 
   static void expectHomography(const MatchPoints::Response& response)
@@ -91,25 +64,11 @@ protected:
 
   static void expectRefusal(const MatchPoints::Response& response, const std::string& naming)
   {
-    EXPECT_FALSE(response.success);
-    EXPECT_NE(response.message.find(naming), std::string::npos) << response.message << "\ndoes not name " << naming;
-    EXPECT_EQ(response.message.find('\n'), std::string::npos) << response.message;
+    expectFailure(response, naming);
     EXPECT_TRUE(std::isnan(response.model_matrix[0]));
     EXPECT_TRUE(std::isnan(response.rms_error));
     EXPECT_EQ(response.inliers, 0);
   }
-
-  static void saveView(const std::string& name, const cv::Mat& image)
-  {
-    StoredView view;
-    view.name = name;
-    view.image = image;
-    ViewStore(viewsDir("open/point_matcher")).save(view, true);
-  }
-
-  TemporaryDirectory directory_;
-  cv::Mat picture_;
-  cv::Mat seen_;
 };
 
 TEST_F(MatchServiceTest, FindsTheHomographyOfTwoFiles)
@@ -233,7 +192,7 @@ TEST_F(MatchServiceTest, MatchesStoredViews)
   request.reference.view = "wall";
   request.query.view = "wall_seen";
   expectHomography(call(request));
-  expectHomography(call(request, MATCH_WITHOUT_PATHS));
+  expectHomography(answer<MatchPoints>(MATCH_WITHOUT_PATHS, request));
 
   // The node keeps views in memory; one that is saved anew counts all the same.
   saveView("wall", texturedPicture(2));
@@ -319,8 +278,8 @@ TEST_F(MatchServiceTest, RefusesFilesWhenPathsAreNotAllowed)
   MatchPoints::Request request = goodRequest();
   request.reference = ImageSource();
   request.reference.path = file("reference.png", picture_);
-  expectRefusal(call(request, MATCH_WITHOUT_PATHS), "~allow_paths");
-  expectHomography(call(goodRequest(), MATCH_WITHOUT_PATHS));
+  expectRefusal(answer<MatchPoints>(MATCH_WITHOUT_PATHS, request), "~allow_paths");
+  expectHomography(answer<MatchPoints>(MATCH_WITHOUT_PATHS, goodRequest()));
 }
 
 }  // namespace
