@@ -1,17 +1,12 @@
 // Copyright (c) 2026, the view_servo authors
 // SPDX-License-Identifier: BSD-3-Clause
-#include "node_test.h"
-#include "support/temporary_directory.h"
+#include "matcher_test.h"
 
 #include "view_servo/LineMatches.h"
 #include "view_servo/MatchLines.h"
-#include "view_servo/SetView.h"
-#include "view_servo/ros/call_service.h"
-#include "view_servo/views/view_store.h"
 
 #include <gtest/gtest.h>
 #include <Eigen/Geometry>
-#include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
 
 #include <cmath>
@@ -26,8 +21,7 @@ namespace test
 {
 namespace
 {
-const std::string MATCH = "line_matcher/match";
-const std::string SET_VIEW = "line_matcher/set_view";
+const std::string NODE = "line_matcher";
 
 /** Whether the current segment lies within 2 px of where `h` sends the line of the reference, and beside it. */
 bool isRight(const LineMatch& match, const Eigen::Matrix3d& h)
@@ -50,63 +44,28 @@ bool isRight(const LineMatch& match, const Eigen::Matrix3d& h)
          place(current.x1, current.y1) < length && place(current.x2, current.y2) > 0.0;
 }
 
-class LineMatcherTest : public ::testing::Test
+class LineMatcherTest : public MatcherTest<MatchLines>
 {
 protected:
+  LineMatcherTest() : MatcherTest(NODE, texturedPicture(1), warped(texturedPicture(1), exampleHomography()))
+  {
+  }
+
   static void SetUpTestSuite()
   {
-    ASSERT_TRUE(waitForService(MATCH));
-    ASSERT_TRUE(waitForService(SET_VIEW));
+    ASSERT_TRUE(waitForService(NODE + "/match"));
+    ASSERT_TRUE(waitForService(NODE + "/set_view"));
   }
 
   static void TearDownTestSuite()
   {
-    removeViews("line_matcher");
+    removeViews(NODE);
   }
 
   void SetUp() override
   {
     ASSERT_TRUE(camera_.waitForSubscribers(1));
     ASSERT_TRUE(setView("").success);
-  }
-
-  std::string file(const std::string& name, const cv::Mat& image) const
-  {
-    std::string path = (directory_.path() / name).string();
-    EXPECT_TRUE(cv::imwrite(path, image)) << path;
-    return path;
-  }
-
-  MatchLines::Request goodRequest() const
-  {
-    MatchLines::Request request;
-    request.reference.image = toMono8(picture_);
-    request.query.image = toMono8(seen_);
-    return request;
-  }
-
-  static MatchLines::Response call(MatchLines::Request request)
-  {
-    MatchLines::Response response;
-    EXPECT_TRUE(callService(MATCH, request, response)) << "the node did not answer";
-    return response;
-  }
-
-  static SetView::Response setView(const std::string& view)
-  {
-    SetView::Request request;
-    request.view = view;
-    SetView::Response response;
-    EXPECT_TRUE(callService(SET_VIEW, request, response)) << "the node did not answer";
-    return response;
-  }
-
-  static void saveView(const std::string& name, const cv::Mat& image)
-  {
-    StoredView view;
-    view.name = name;
-    view.image = image;
-    ViewStore(viewsDir("line_matcher")).save(view, true);
   }
 
   static void expectLines(const std::vector<LineMatch>& matches, const Eigen::Matrix3d& h = exampleHomography())
@@ -133,9 +92,7 @@ protected:
 
   static void expectRefusal(const MatchLines::Response& response, const std::string& naming)
   {
-    EXPECT_FALSE(response.success);
-    EXPECT_NE(response.message.find(naming), std::string::npos) << response.message << "\ndoes not name " << naming;
-    EXPECT_EQ(response.message.find('\n'), std::string::npos) << response.message;
+    expectFailure(response, naming);
     EXPECT_TRUE(response.plane_homographies.empty());
     EXPECT_TRUE(toMatrix(response.fundamental).array().isNaN().all());
   }
@@ -148,9 +105,6 @@ protected:
     sent_.insert(stamp);
   }
 
-  TemporaryDirectory directory_;
-  const cv::Mat picture_ = texturedPicture(1);
-  const cv::Mat seen_ = warped(picture_, exampleHomography());
   FakeCamera camera_{ "camera" };
   Recorder<LineMatches> matches_{ "line_matcher/line_matches" };
   std::set<ros::Time> sent_;
