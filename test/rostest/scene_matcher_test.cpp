@@ -1,18 +1,13 @@
 // Copyright (c) 2026, the view_servo authors
 // SPDX-License-Identifier: BSD-3-Clause
-#include "node_test.h"
+#include "matcher_test.h"
 #include "support/room_corner.h"
-#include "support/temporary_directory.h"
 
 #include "view_servo/MatchScene.h"
 #include "view_servo/SceneMatches.h"
-#include "view_servo/SetView.h"
-#include "view_servo/ros/call_service.h"
-#include "view_servo/views/view_store.h"
 
 #include <gtest/gtest.h>
 #include <Eigen/Geometry>
-#include <opencv2/imgcodecs.hpp>
 
 #include <cmath>
 #include <functional>
@@ -26,51 +21,31 @@ namespace test
 {
 namespace
 {
-const std::string MATCH = "scene_matcher/match";
-const std::string SET_VIEW = "scene_matcher/set_view";
+const std::string NODE = "scene_matcher";
 
-class SceneMatcherTest : public ::testing::Test
+class SceneMatcherTest : public MatcherTest<MatchScene>
 {
 protected:
+  explicit SceneMatcherTest(const RoomCorner& room = RoomCorner())
+    : MatcherTest(NODE, room.reference, room.current), room_(room)
+  {
+  }
+
   static void SetUpTestSuite()
   {
-    ASSERT_TRUE(waitForService(MATCH));
-    ASSERT_TRUE(waitForService(SET_VIEW));
+    ASSERT_TRUE(waitForService(NODE + "/match"));
+    ASSERT_TRUE(waitForService(NODE + "/set_view"));
   }
 
   static void TearDownTestSuite()
   {
-    removeViews("scene_matcher");
+    removeViews(NODE);
   }
 
   void SetUp() override
   {
     ASSERT_TRUE(camera_.waitForSubscribers(1));
     ASSERT_TRUE(setView("").success);
-  }
-
-  MatchScene::Request goodRequest() const
-  {
-    MatchScene::Request request;
-    request.reference.image = toMono8(room_.reference);
-    request.query.image = toMono8(room_.current);
-    return request;
-  }
-
-  static MatchScene::Response call(MatchScene::Request request)
-  {
-    MatchScene::Response response;
-    EXPECT_TRUE(callService(MATCH, request, response)) << "the node did not answer";
-    return response;
-  }
-
-  static SetView::Response setView(const std::string& view)
-  {
-    SetView::Request request;
-    request.view = view;
-    SetView::Response response;
-    EXPECT_TRUE(callService(SET_VIEW, request, response)) << "the node did not answer";
-    return response;
   }
 
   /** The calibration of the camera that took the pictures of the room. */
@@ -88,7 +63,7 @@ protected:
     view.name = name;
     view.image = image;
     view.camera = toCamera(info(image));
-    ViewStore(viewsDir("scene_matcher")).save(view, true);
+    save(view);
   }
 
   void send(const cv::Mat& image)
@@ -140,9 +115,7 @@ protected:
 
   static void expectRefusal(const MatchScene::Response& response, const std::string& naming)
   {
-    EXPECT_FALSE(response.success);
-    EXPECT_NE(response.message.find(naming), std::string::npos) << response.message << "\ndoes not name " << naming;
-    EXPECT_EQ(response.message.find('\n'), std::string::npos) << response.message;
+    expectFailure(response, naming);
     EXPECT_EQ(response.found, "");
     EXPECT_TRUE(toMatrix(response.model_matrix).array().isNaN().all());
     EXPECT_TRUE(std::isnan(response.epipole_reference[0]));
@@ -150,7 +123,6 @@ protected:
     expectNoMotion(response);
   }
 
-  TemporaryDirectory directory_;
   const RoomCorner room_;
   FakeCamera camera_{ "camera" };
   Recorder<SceneMatches> matches_{ "scene_matcher/scene_matches" };
@@ -160,10 +132,8 @@ protected:
 TEST_F(SceneMatcherTest, FindsTheFundamentalMatrixOfTwoFiles)
 {
   MatchScene::Request request;
-  request.reference.path = (directory_.path() / "reference.png").string();
-  request.query.path = (directory_.path() / "query.png").string();
-  ASSERT_TRUE(cv::imwrite(request.reference.path, room_.reference));
-  ASSERT_TRUE(cv::imwrite(request.query.path, room_.current));
+  request.reference.path = file("reference.png", picture_);
+  request.query.path = file("query.png", seen_);
   request.overlay = true;
   const MatchScene::Response response = call(request);
   EXPECT_TRUE(response.success) << response.message;
