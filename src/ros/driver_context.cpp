@@ -23,7 +23,8 @@ DriverInput::Stamp DriverInput::checkStamp(const ros::Time& stamp)
   const double age = ageOf(stamp);
   if (age > max_age_)
   {
-    reject(name + ": stamped " + seconds(age) + " ago, at most " + seconds(max_age_) + " are allowed");
+    reject(name + ": stamped " + seconds(age) + " ago, at most " + seconds(max_age_) + " are allowed" +
+           remedyOfAge(age));
     return Stamp::UNUSABLE;
   }
   if (-age > std::min(max_age_, MAX_AHEAD))

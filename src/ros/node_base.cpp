@@ -40,6 +40,14 @@ double ageOf(const ros::Time& stamp)
   return secondsBetween(stamp, ros::Time::now());
 }
 
+std::string remedyOfAge(double age)
+{
+  constexpr double FROM_A_BAG = 60.0;  // nothing is so late that comes from a robot [s]
+  return age > FROM_A_BAG && !ros::Time::isSimTime()
+             ? "; if it is from a bag, set use_sim_time before the nodes start, and play it with rosbag play --clock"
+             : "";
+}
+
 ExitDeadline::ExitDeadline(std::function<bool()> asked) : thread_([this, asked = std::move(asked)] { watch(asked); })
 {
 }

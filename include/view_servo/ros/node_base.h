@@ -36,6 +36,12 @@ double secondsBetween(const ros::Time& from, const ros::Time& to);
 double ageOf(const ros::Time& stamp);
 
 /**
+ * What to do about a message of such an age [s], to be appended to its fault, when it must come from a bag while ROS'
+ * clock is not the bag's; else empty.
+ */
+std::string remedyOfAge(double age);
+
+/**
  * The order of the stamps of one input. A message may overtake another one, and is late then; but when one after the
  * other is far behind, time itself has gone back, as when a bag loops or a simulation begins anew.
  */
