@@ -21,7 +21,8 @@ Finding judgeImages(const CameraObservations& camera)
   }
   if (!camera.image_fault.empty())
   {
-    return error(name, camera.image_fault, "set the camera's driver to mono8, bgr8 or another encoding of OpenCV");
+    return error(name, camera.image_fault,
+                 "set the camera's driver to mono8, bgr8 or another encoding of OpenCV, compressed to jpeg or png");
   }
   const std::string found = number(camera.images.rate, 1) + " Hz on '" + camera.images.topic + "', " +
                             std::to_string(camera.width) + " x " + std::to_string(camera.height) + ", " +

@@ -16,8 +16,8 @@ namespace view_servo::check
 {
 namespace
 {
-constexpr std::uint32_t QUEUE_SIZE = 5;  // as nodes have it
-constexpr std::size_t KEPT = 20;         // messages of each kind
+constexpr int QUEUE_SIZE = 5;     // as nodes have it
+constexpr std::size_t KEPT = 20;  // messages of each kind
 
 /** The newest message with a stamp; null when there is none. */
 template <typename Pointer>
@@ -53,17 +53,14 @@ double steadySeconds()
 CameraListener::CameraListener(const ros::NodeHandle& nh, const Setup& setup)
   : topics_{ nh.resolveName(setup.camera + "/image_raw"), nh.resolveName(setup.camera + "/camera_info") },
     input_("image", "'" + topics_.image + "'", INPUT_TIMEOUT),
-    last_time_(-std::numeric_limits<double>::infinity()),
-    transport_(nh)
+    last_time_(-std::numeric_limits<double>::infinity())
 {
   ros::NodeHandle topics_nh(nh);
-  const image_transport::TransportHints hints(setup.image_transport);
-  image_subscriber_ = transport_.subscribe(
-      topics_.image, QUEUE_SIZE,
-      [this](const sensor_msgs::ImageConstPtr& image) {
-        guarded("an image on '" + topics_.image + "'", [&] { onImage(image); });
-      },
-      ros::VoidPtr(), hints);
+  image_subscriber_.registerCallback([this](const CameraImageConstPtr& image) {
+    guarded("an image on '" + image->topic + "'", [&] { onImage(image); });
+  });
+  image_subscriber_.subscribe(nh, topics_.image, setup.image_transport, QUEUE_SIZE);
+  topics_.image = image_subscriber_.getTopic();
   const boost::function<void(const sensor_msgs::CameraInfoConstPtr&)> on_info =
       [this](const sensor_msgs::CameraInfoConstPtr& info) {
         guarded("camera_info on '" + topics_.info + "'", [&] { onInfo(info); });
@@ -71,7 +68,7 @@ CameraListener::CameraListener(const ros::NodeHandle& nh, const Setup& setup)
   info_subscriber_ = topics_nh.subscribe<sensor_msgs::CameraInfo>(topics_.info, QUEUE_SIZE, on_info);
 }
 
-void CameraListener::onImage(const sensor_msgs::ImageConstPtr& image)
+void CameraListener::onImage(const CameraImageConstPtr& image)
 {
   const std::lock_guard<std::mutex> lock(mutex_);
   const DriverInput::Stamp place = input_.checkStamp(image->header.stamp);
@@ -90,16 +87,19 @@ void CameraListener::onInfo(const sensor_msgs::CameraInfoConstPtr& info)
   const std::lock_guard<std::mutex> lock(mutex_);
   infos_.add(steadySeconds(), ageOf(info->header.stamp), false);
   keep(last_infos_, info);
-  if (const sensor_msgs::ImageConstPtr image = withStamp(last_images_, info->header.stamp))
+  if (const CameraImageConstPtr image = withStamp(last_images_, info->header.stamp))
   {
     pair(image, info);
   }
 }
 
-void CameraListener::pair(const sensor_msgs::ImageConstPtr& image, const sensor_msgs::CameraInfoConstPtr& info)
+void CameraListener::pair(const CameraImageConstPtr& image, const sensor_msgs::CameraInfoConstPtr& info)
 {
   pairs_ += frame_ && frame_->image == image ? 0 : 1;
-  frame_ = CameraFrame{ image, info };
+  if (image->fault.empty())
+  {
+    frame_ = CameraFrame{ image, info };
+  }
 }
 
 CameraObservations CameraListener::observations(const RosGraph& graph, double duration) const
@@ -119,7 +119,7 @@ CameraObservations CameraListener::observations(const RosGraph& graph, double du
   {
     return camera;
   }
-  const sensor_msgs::Image& image = *last_images_.back();
+  const CameraImage& image = *last_images_.back();
   camera.width = static_cast<int>(image.width);
   camera.height = static_cast<int>(image.height);
   camera.encoding = image.encoding;
@@ -133,7 +133,7 @@ CameraObservations CameraListener::observations(const RosGraph& graph, double du
   }
   try
   {
-    camera.picture = measurePicture(toGrey(image, "an image on '" + topics_.image + "'"));
+    camera.picture = measurePicture(toGrey(image));
   }
   catch (const ImageError& error)
   {
@@ -153,7 +153,7 @@ cv::Mat CameraListener::picture() const
   const std::lock_guard<std::mutex> lock(mutex_);
   try
   {
-    return last_images_.empty() ? cv::Mat() : toGrey(*last_images_.back(), "an image on '" + topics_.image + "'");
+    return last_images_.empty() ? cv::Mat() : toGrey(*last_images_.back());
   }
   catch (const ImageError&)
   {

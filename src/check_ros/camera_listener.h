@@ -9,7 +9,6 @@
 #include "view_servo/ros/camera_input.h"
 #include "view_servo/ros/driver_context.h"
 
-#include <image_transport/image_transport.h>
 #include <ros/node_handle.h>
 #include <ros/subscriber.h>
 #include <opencv2/core/mat.hpp>
@@ -55,10 +54,10 @@ public:
   }
 
 private:
-  void onImage(const sensor_msgs::ImageConstPtr& image);
+  void onImage(const CameraImageConstPtr& image);
   void onInfo(const sensor_msgs::CameraInfoConstPtr& info);
   /** Two messages with the same stamp. The mutex is held. */
-  void pair(const sensor_msgs::ImageConstPtr& image, const sensor_msgs::CameraInfoConstPtr& info);
+  void pair(const CameraImageConstPtr& image, const sensor_msgs::CameraInfoConstPtr& info);
 
   CameraTopics topics_;
   mutable std::mutex mutex_;  // guards what follows, up to the transport
@@ -66,14 +65,13 @@ private:
   std::string stamp_fault_;  // of the last image
   StreamMeter images_;
   StreamMeter infos_;
-  std::deque<sensor_msgs::ImageConstPtr> last_images_;
+  std::deque<CameraImageConstPtr> last_images_;
   std::deque<sensor_msgs::CameraInfoConstPtr> last_infos_;
   double last_time_;
   std::optional<CameraFrame> frame_;
   int pairs_ = 0;
 
-  image_transport::ImageTransport transport_;
-  image_transport::Subscriber image_subscriber_;
+  CameraImageSubscriber image_subscriber_;
   ros::Subscriber info_subscriber_;
 };
 

@@ -39,7 +39,7 @@ std::string join(const std::vector<std::string>& texts)
 
 cv::Mat greyOf(const CameraFrame& frame)
 {
-  return toGrey(*frame.image, "an image of the test drive");
+  return toGrey(*frame.image);
 }
 
 }  // namespace

@@ -38,6 +38,11 @@ std::string quoted(const std::string& name)
   return "'" + name + "'";
 }
 
+ImageError unreadable(const std::string& name)
+{
+  return ImageError(quoted(name) + " is not an image, or is damaged; PNG, JPEG, PNM, BMP and TIFF are read");
+}
+
 void checkSize(const Header& size, const std::string& name)
 {
   const std::string is = quoted(name) + " is " + std::to_string(size.width) + " x " + std::to_string(size.height);
@@ -335,15 +340,22 @@ cv::Mat toGrey(const cv::Mat& image, const std::string& name)
   return grey;
 }
 
-cv::Mat decodeGreyImage(const std::string& bytes, const std::string& name)
+cv::Size encodedImageSize(const std::string& bytes, const std::string& name)
 {
   const std::optional<Header> header = readHeader(bytes);
-  cv::Mat image;
-  if (header)
+  if (!header)
   {
-    checkSize(*header, name);
+    throw unreadable(name);
   }
-  if (header && !isTruncatedJpeg(bytes))
+  checkSize(*header, name);
+  return { static_cast<int>(header->width), static_cast<int>(header->height) };
+}
+
+cv::Mat decodeImage(const std::string& bytes, const std::string& name)
+{
+  encodedImageSize(bytes, name);
+  cv::Mat image;
+  if (!isTruncatedJpeg(bytes))
   {
     try
     {
@@ -358,9 +370,14 @@ cv::Mat decodeGreyImage(const std::string& bytes, const std::string& name)
   }
   if (image.empty())
   {
-    throw ImageError(quoted(name) + " is not an image, or is damaged; PNG, JPEG, PNM, BMP and TIFF are read");
+    throw unreadable(name);
   }
-  return toGrey(image, name);
+  return image;
+}
+
+cv::Mat decodeGreyImage(const std::string& bytes, const std::string& name)
+{
+  return toGrey(decodeImage(bytes, name), name);
 }
 
 cv::Mat readGreyImage(const std::string& path)

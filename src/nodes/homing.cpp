@@ -81,7 +81,6 @@ public:
       store_(viewsDir(params.views_dir)),
       output_(context.nodeHandle(), context.commandTopic(), base_frame_),
       worker_(
-          context.resolved("image_raw"),
           [this](const HomingOutcome& outcome) {
             context_.runLocked("the outcome of an image", [&] { onOutcome(outcome); });
             if (storeStructure(store_, outcome))

@@ -291,7 +291,7 @@ private:
       publishHomography(task, PlaneTrack(), header, reason, true);
       return;
     }
-    const cv::Mat image = toGrey(*frame.image, camera_.imageTopic());
+    const cv::Mat image = toGrey(*frame.image);
     std::string news;
     const StampOrder::Place place = session_->checkTime(header.stamp);
     if (place == StampOrder::LATE || place == StampOrder::FAR_LATE)

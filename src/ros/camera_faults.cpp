@@ -27,7 +27,7 @@ std::string faultOf(const CameraTraffic& traffic, const CameraTopics& topics)
   return "";
 }
 
-std::string faultOf(const sensor_msgs::Image& image, const sensor_msgs::CameraInfo& info, const CameraTopics& topics)
+std::string faultOf(const CameraImage& image, const sensor_msgs::CameraInfo& info, const CameraTopics& topics)
 {
   const Camera camera = toCamera(info);
   const std::string fault = camera.fault();
@@ -53,7 +53,7 @@ std::string faultOfAge(const ros::Time& stamp, const std::string& topic, double 
   }
   return "the latest camera image on '" + topic + "' is " +
          (age > 0.0 ? seconds(age) + " old" : "stamped " + seconds(-age) + " in the future") + ", ~max_image_age is " +
-         seconds(max_age);
+         seconds(max_age) + remedyOfAge(age);
 }
 
 }  // namespace view_servo

@@ -28,7 +28,7 @@ std::vector<Parameter> parameters(CameraInputParams& params)
 {
   return {
     text("image_transport", params.image_transport,
-         "how camera images travel: raw, or another image transport that is installed"),
+         "how camera images travel: raw, compressed, or another image transport that is installed"),
     integer("queue_size", params.queue_size, "", ">= 1",
             "images that wait for the camera_info of their stamp, and the other way round"),
     real("max_image_age", params.max_image_age, "s", "> 0",
@@ -42,20 +42,19 @@ CameraInput::CameraInput(const ros::NodeHandle& nh, const CameraInputParams& par
     on_frame_(std::move(on_frame)),
     on_problem_(std::move(on_problem)),
     last_diagnosis_(ros::WallTime::now()),
-    transport_(nh),
     synchronizer_(static_cast<std::uint32_t>(params.queue_size))
 {
   const auto queue_size = static_cast<std::uint32_t>(params.queue_size);
   ros::NodeHandle topics_nh(nh);
   synchronizer_.connectInput(image_subscriber_, info_subscriber_);
   synchronizer_.registerCallback(&CameraInput::frameCallback, this);
-  image_subscriber_.registerCallback([this](const sensor_msgs::ImageConstPtr&) { onImage(); });
+  image_subscriber_.registerCallback([this](const CameraImageConstPtr&) { onImage(); });
   info_subscriber_.registerCallback([this](const sensor_msgs::CameraInfoConstPtr&) {
     const std::lock_guard<std::mutex> lock(mutex_);
     ++infos_;
     unpaired_ = 0;
   });
-  image_subscriber_.subscribe(transport_, "image_raw", queue_size, image_transport::TransportHints());
+  image_subscriber_.subscribe(nh, "image_raw", params.image_transport, params.queue_size);
   info_subscriber_.subscribe(topics_nh, "camera_info", queue_size);
   check_timer_ =
       topics_nh.createWallTimer(ros::WallDuration(CHECK_PERIOD), [this](const ros::WallTimerEvent&) { checkInputs(); });
@@ -169,13 +168,23 @@ void CameraInput::diagnose(diagnostic_updater::DiagnosticStatusWrapper& status)
   status.add("Rate [Hz]", rate_);
 }
 
-void CameraInput::frameCallback(const sensor_msgs::ImageConstPtr& image, const sensor_msgs::CameraInfoConstPtr& info)
+void CameraInput::frameCallback(const CameraImageConstPtr& image, const sensor_msgs::CameraInfoConstPtr& info)
 {
   guarded("an image on '" + imageTopic() + "'", [&] { onPair(image, info); });
 }
 
-void CameraInput::onPair(const sensor_msgs::ImageConstPtr& image, const sensor_msgs::CameraInfoConstPtr& info)
+void CameraInput::onPair(const CameraImageConstPtr& image, const sensor_msgs::CameraInfoConstPtr& info)
 {
+  if (!image->fault.empty())
+  {
+    {
+      const std::lock_guard<std::mutex> lock(mutex_);
+      ++pairs_;
+      problem_ = image->fault;
+    }
+    reportProblem(image->fault + "; it is left out");
+    return;
+  }
   const std::string fault = faultOf(*image, *info, topics());
   {
     const std::lock_guard<std::mutex> lock(mutex_);

@@ -6,10 +6,12 @@
 
 #include <cv_bridge/cv_bridge.h>
 #include <sensor_msgs/image_encodings.h>
+#include <boost/make_shared.hpp>
 
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <cstddef>
 #include <cstdint>
 #include <limits>
 
@@ -40,6 +42,33 @@ bool needsReordering(const std::string& encoding)
   namespace enc = sensor_msgs::image_encodings;
   return enc::isBayer(encoding) || encoding == enc::RGB8 || encoding == enc::RGBA8 || encoding == enc::RGB16 ||
          encoding == enc::RGBA16 || encoding == enc::YUV422;
+}
+
+/** Grey of an image that needs reordering. @throws cv_bridge::Exception, ImageError. */
+cv::Mat reordered(const cv_bridge::CvImageConstPtr& image, const std::string& name)
+{
+  return toGrey(cv_bridge::cvtColor(image, sensor_msgs::image_encodings::BGR8)->image, name);
+}
+
+/** What `read`, given the data and its name, makes of a compressed image; errors say what it was said to be. */
+template <typename Result>
+Result readCompressed(const sensor_msgs::CompressedImage& image, const std::string& name,
+                      Result (*read)(const std::string&, const std::string&))
+{
+  const std::string said =
+      " (format '" + image.format.substr(0, 80) + "', " + std::to_string(image.data.size()) + " bytes)";
+  if (image.format.find("compressedDepth") != std::string::npos)
+  {
+    throw ImageError("'" + name + "' is a depth image, which shows no intensities" + said);
+  }
+  try
+  {
+    return read(std::string(image.data.begin(), image.data.end()), name);
+  }
+  catch (const ImageError& error)
+  {
+    throw ImageError(error.what() + said);
+  }
 }
 
 }  // namespace
@@ -114,15 +143,56 @@ cv::Mat toGrey(const sensor_msgs::Image& image, const std::string& name)
   {
     const boost::shared_ptr<const void> outlives_this_call;
     const cv_bridge::CvImageConstPtr shared = cv_bridge::toCvShare(image, outlives_this_call);
-    if (needsReordering(image.encoding))
-    {
-      return toGrey(cv_bridge::cvtColor(shared, sensor_msgs::image_encodings::BGR8)->image, name);
-    }
-    return toGrey(shared->image, name).clone();
+    return needsReordering(image.encoding) ? reordered(shared, name) : toGrey(shared->image, name).clone();
   }
   catch (const cv_bridge::Exception& error)
   {
     throw ImageError("'" + name + "': encoding '" + image.encoding + "': " + error.what());
+  }
+}
+
+cv::Size sizeOf(const sensor_msgs::CompressedImage& image, const std::string& name)
+{
+  return readCompressed(image, name, encodedImageSize);
+}
+
+cv::Mat toGrey(const sensor_msgs::CompressedImage& image, const std::string& name)
+{
+  const cv::Mat decoded = readCompressed(image, name, decodeImage);
+  const std::string encoding = decodedEncoding(image.format, decoded.type());
+  if (!needsReordering(encoding))
+  {
+    return toGrey(decoded, name);
+  }
+  try
+  {
+    return reordered(boost::make_shared<const cv_bridge::CvImage>(image.header, encoding, decoded), name);
+  }
+  catch (const cv_bridge::Exception& error)
+  {
+    throw ImageError("'" + name + "': format '" + image.format + "': " + error.what());
+  }
+}
+
+std::string decodedEncoding(const std::string& format, int type)
+{
+  namespace enc = sensor_msgs::image_encodings;
+  const std::size_t separator = format.find(';');
+  const std::string original = separator == std::string::npos ? "" : format.substr(0, separator);
+  const bool is_rgb = enc::isColor(original) && format.find("compressed bgr", separator) == std::string::npos;
+  const bool has_16_bits = CV_MAT_DEPTH(type) == CV_16U;
+  switch (CV_MAT_CN(type))
+  {
+    case 3:
+      return has_16_bits ? (is_rgb ? enc::RGB16 : enc::BGR16) : (is_rgb ? enc::RGB8 : enc::BGR8);
+    case 4:
+      return has_16_bits ? (is_rgb ? enc::RGBA16 : enc::BGRA16) : (is_rgb ? enc::RGBA8 : enc::BGRA8);
+    default:
+      if (enc::isBayer(original) && (enc::bitDepth(original) == 16) == has_16_bits)
+      {
+        return original;
+      }
+      return has_16_bits ? enc::MONO16 : enc::MONO8;
   }
 }
 

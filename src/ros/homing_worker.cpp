@@ -72,10 +72,9 @@ bool storeStructure(const ViewStore& store, const HomingOutcome& outcome)
   return true;
 }
 
-HomingWorker::HomingWorker(std::string image_topic, std::function<void(const HomingOutcome&)> on_outcome,
+HomingWorker::HomingWorker(std::function<void(const HomingOutcome&)> on_outcome,
                            std::function<void(const CameraFrame&)> on_idle_frame)
-  : image_topic_(std::move(image_topic)),
-    on_outcome_(std::move(on_outcome)),
+  : on_outcome_(std::move(on_outcome)),
     on_idle_frame_(std::move(on_idle_frame)),
     worker_("work on images and matches", [this](Inputs&& inputs) { work(inputs); })
 {
@@ -150,7 +149,7 @@ void HomingWorker::add(const Inputs& inputs, Homing& homing) const
   }
   if (inputs.frame)
   {
-    homing.addImage(inputs.frame->image->header.stamp.toSec(), toGrey(*inputs.frame->image, image_topic_));
+    homing.addImage(inputs.frame->image->header.stamp.toSec(), toGrey(*inputs.frame->image));
   }
 }
 

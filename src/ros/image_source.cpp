@@ -104,7 +104,7 @@ SourcedImage ImageSourceReader::read(SourceKind kind, const ImageSource& source,
     case SourceKind::CAMERA:
     {
       const CameraFrame frame = camera_.latest(image_patience_);
-      result.grey = toGrey(*frame.image, camera_.imageTopic());
+      result.grey = toGrey(*frame.image);
       result.header = frame.image->header;
       result.camera = toCamera(*frame.info);
       break;

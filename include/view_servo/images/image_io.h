@@ -3,6 +3,7 @@
 #pragma once
 
 #include <opencv2/core/mat.hpp>
+#include <opencv2/core/types.hpp>
 
 #include <cstdint>
 #include <stdexcept>
@@ -30,6 +31,18 @@ constexpr int MIN_IMAGE_SIDE = 16;
  * @throws ImageError for other types, empty images and sizes beyond the two limits.
  */
 cv::Mat toGrey(const cv::Mat& image, const std::string& name);
+
+/**
+ * The size that the header of a PNG, JPEG, PNM, BMP or TIFF file gives, without decoding the image.
+ * @throws ImageError when the bytes do not begin as such a file, or the size is beyond the limits.
+ */
+cv::Size encodedImageSize(const std::string& bytes, const std::string& name);
+
+/**
+ * The image in the bytes of such a file as it is: 8 or 16 bits, 1, 3 (BGR) or 4 (BGRA) channels, not turned.
+ * @throws ImageError as encodedImageSize() does, and when the data is damaged.
+ */
+cv::Mat decodeImage(const std::string& bytes, const std::string& name);
 
 /**
  * The bytes of a PNG, JPEG, PNM, BMP or TIFF file as 8-bit grey. Other formats are refused, as they cannot tell their

@@ -2,9 +2,10 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include "view_servo/ros/camera_image.h"
+
 #include <ros/time.h>
 #include <sensor_msgs/CameraInfo.h>
-#include <sensor_msgs/Image.h>
 
 #include <string>
 
@@ -40,7 +41,7 @@ struct CameraTraffic
 std::string faultOf(const CameraTraffic& traffic, const CameraTopics& topics);
 
 /** By what is in an image and the camera_info of the same stamp: calibration and sizes. */
-std::string faultOf(const sensor_msgs::Image& image, const sensor_msgs::CameraInfo& info, const CameraTopics& topics);
+std::string faultOf(const CameraImage& image, const sensor_msgs::CameraInfo& info, const CameraTopics& topics);
 
 /**
  * By an image's stamp. One from the future is as bad as an old one: time jumped back, as when a bag loops.

@@ -3,17 +3,15 @@
 #pragma once
 
 #include "view_servo/ros/camera_faults.h"
+#include "view_servo/ros/camera_image.h"
 #include "view_servo/ros/parameters.h"
 
 #include <diagnostic_updater/DiagnosticStatusWrapper.h>
-#include <image_transport/image_transport.h>
-#include <image_transport/subscriber_filter.h>
 #include <message_filters/subscriber.h>
 #include <message_filters/time_synchronizer.h>
 #include <ros/node_handle.h>
 #include <ros/wall_timer.h>
 #include <sensor_msgs/CameraInfo.h>
-#include <sensor_msgs/Image.h>
 
 #include <chrono>
 #include <functional>
@@ -25,7 +23,7 @@ namespace view_servo
 /** An image with its calibration. */
 struct CameraFrame
 {
-  sensor_msgs::ImageConstPtr image;
+  CameraImageConstPtr image;
   sensor_msgs::CameraInfoConstPtr info;
 };
 
@@ -43,12 +41,13 @@ std::vector<Parameter> parameters(CameraInputParams& params);
 /**
  * A node's camera: the newest image that comes with a calibration of the same stamp.
  *
- * Subscribes to `image_raw` (sensor_msgs/Image) and `camera_info` (sensor_msgs/CameraInfo), each of which can be
- * remapped by itself.
+ * Subscribes to `image_raw` (sensor_msgs/Image, or what `image_transport` makes of it, see CameraImageSubscriber) and
+ * `camera_info` (sensor_msgs/CameraInfo), each of which can be remapped by itself.
  *
  * A frame that cannot be used (camera not calibrated, or calibrated for another size) is dropped, with a throttled
  * error that names both topics. A similar error tells of images and camera_info that never have the same stamp. An
- * image from the future is as bad as an old one: time jumped back, as when a bag loops.
+ * image from the future is as bad as an old one: time jumped back, as when a bag loops. A compressed image whose data
+ * cannot be decoded is left out, with a throttled error; those before and after it count.
  */
 class CameraInput
 {
@@ -58,7 +57,7 @@ public:
   /**
    * Both functions are called by a spinner's thread, and have to be quick.
    * @param on_frame called with every usable frame. @param on_problem called for every other frame, and for images
-   * without calibrations, with what is wrong.
+   * without calibrations, with what is wrong. @throws std::invalid_argument when there is no such transport.
    */
   CameraInput(const ros::NodeHandle& nh, const CameraInputParams& params, Callback on_frame = Callback(),
               std::function<void(const std::string&)> on_problem = {});
@@ -93,11 +92,11 @@ public:
   void diagnose(diagnostic_updater::DiagnosticStatusWrapper& status);
 
 private:
-  void frameCallback(const sensor_msgs::ImageConstPtr& image, const sensor_msgs::CameraInfoConstPtr& info);
+  void frameCallback(const CameraImageConstPtr& image, const sensor_msgs::CameraInfoConstPtr& info);
   void onImage();
   /** Logs a problem and hands it on; nothing when it is empty. The mutex is not held. */
   void reportProblem(const std::string& problem) const;
-  void onPair(const sensor_msgs::ImageConstPtr& image, const sensor_msgs::CameraInfoConstPtr& info);
+  void onPair(const CameraImageConstPtr& image, const sensor_msgs::CameraInfoConstPtr& info);
   void checkInputs();
   CameraTopics topics() const;
 
@@ -118,10 +117,9 @@ private:
   int frames_ = 0;                                        // usable, since the last diagnosis
   ros::WallTime last_diagnosis_;
 
-  image_transport::ImageTransport transport_;
-  image_transport::SubscriberFilter image_subscriber_;
+  CameraImageSubscriber image_subscriber_;
   message_filters::Subscriber<sensor_msgs::CameraInfo> info_subscriber_;
-  message_filters::TimeSynchronizer<sensor_msgs::Image, sensor_msgs::CameraInfo> synchronizer_;
+  message_filters::TimeSynchronizer<CameraImage, sensor_msgs::CameraInfo> synchronizer_;
   ros::WallTimer check_timer_;
 };
 

@@ -19,12 +19,14 @@
 #include <geometry_msgs/Vector3.h>
 #include <ros/time.h>
 #include <sensor_msgs/CameraInfo.h>
+#include <sensor_msgs/CompressedImage.h>
 #include <sensor_msgs/Image.h>
 #include <sensor_msgs/RegionOfInterest.h>
 #include <std_msgs/Header.h>
 #include <Eigen/Core>
 #include <Eigen/Geometry>
 #include <opencv2/core/mat.hpp>
+#include <opencv2/core/types.hpp>
 
 #include <string>
 #include <vector>
@@ -55,6 +57,23 @@ sensor_msgs::CameraInfo toCameraInfo(const Camera& camera, const std_msgs::Heade
  * @throws ImageError when the encoding or the size cannot be used, or the data does not fit the size.
  */
 cv::Mat toGrey(const sensor_msgs::Image& image, const std::string& name);
+/**
+ * A JPEG or PNG image, or another format of decodeImage(), as 8-bit grey.
+ * @param name as above. @throws ImageError, with format and number of bytes, when it is damaged, is not such an image, is
+ * of depths, or has a size beyond the limits, which is found before it is decoded.
+ */
+cv::Mat toGrey(const sensor_msgs::CompressedImage& image, const std::string& name);
+
+/** Size of a compressed image by the header of its data. @throws ImageError likewise, but for damage after the header. */
+cv::Size sizeOf(const sensor_msgs::CompressedImage& image, const std::string& name);
+
+/**
+ * The encoding (sensor_msgs::image_encodings) of what OpenCV makes of a compressed image, as compressed_image_transport
+ * has it: "rgb8; jpeg compressed bgr8" is decoded to BGR; a colour image without "compressed bgr" is in the order RGB;
+ * what says nothing of colours, as "jpeg", is in the order BGR. @param type of the decoded image, e.g. CV_8UC3.
+ */
+std::string decodedEncoding(const std::string& format, int type);
+
 sensor_msgs::Image toImage(const cv::Mat& image, const std::string& encoding, const std_msgs::Header& header);
 
 /** Width and height 0 stand for the whole image, as an empty rectangle. @throws ImageError when it leaves the image. */

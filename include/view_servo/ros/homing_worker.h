@@ -81,7 +81,7 @@ public:
    * @param on_outcome called after each piece of work. @param on_idle_frame called with images that come without a
    * task.
    */
-  HomingWorker(std::string image_topic, std::function<void(const HomingOutcome&)> on_outcome,
+  HomingWorker(std::function<void(const HomingOutcome&)> on_outcome,
                std::function<void(const CameraFrame&)> on_idle_frame);
 
   /** Replaces the task, and forgets what has come for the old one; null: no task. */
@@ -105,7 +105,6 @@ private:
   void work(const Inputs& inputs);
   void add(const Inputs& inputs, Homing& homing) const;
 
-  const std::string image_topic_;
   const std::function<void(const HomingOutcome&)> on_outcome_;
   const std::function<void(const CameraFrame&)> on_idle_frame_;
   std::shared_ptr<HomingTask> task_;  // the thread's alone

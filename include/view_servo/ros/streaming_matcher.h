@@ -359,7 +359,7 @@ private:
       {
         return { false, "nobody listens" };
       }
-      const cv::Mat grey = toGrey(*frame.image, camera_.imageTopic());
+      const cv::Mat grey = toGrey(*frame.image);
       const MatchedImage current{ std::make_shared<const PreparedImage>(grey, cv::Rect(), features_), label.header,
                                   toCamera(*frame.info) };
       const typename Matching::Result result =
