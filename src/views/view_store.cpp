@@ -378,15 +378,21 @@ std::string toYamlText(const StoredView& view, const std::string& image_file)
   return withChecksum(std::string(yaml.c_str(), yaml.size()));
 }
 
+/** Whether the text is, to the byte, what withChecksum() wrote. */
+bool hasGoodChecksum(const std::string& text)
+{
+  const std::size_t end = text.rfind(CHECKSUM_KEY);
+  return end != std::string::npos && text == withChecksum(text.substr(0, end));
+}
+
 /** The text before the last line. @throws Damage when that is not, to the byte, what withChecksum() wrote. */
 std::string withoutChecksum(const std::string& text, const std::string& what)
 {
-  const std::size_t end = text.rfind(CHECKSUM_KEY);
-  if (end == std::string::npos || text != withChecksum(text.substr(0, end)))
+  if (!hasGoodChecksum(text))
   {
     throw Damage(what + " does not agree with the checksum in its last line");
   }
-  return text.substr(0, end);
+  return text.substr(0, text.rfind(CHECKSUM_KEY));
 }
 
 /** @throws Damage when the text is not, to the byte, what toYamlText() wrote. */
@@ -454,6 +460,32 @@ std::optional<StoredView> readView(const fs::path& directory, const std::string&
 [[noreturn]] void fail(const std::string& action, const std::string& name, const std::string& reason)
 {
   throw ViewStoreError("cannot " + action + " view '" + name + "': " + reason);
+}
+
+/** Sorted names of the views that have a yaml file, readable or not. @throws ViewStoreError. */
+std::vector<std::string> findNames(const fs::path& directory)
+{
+  std::vector<std::string> names;
+  try
+  {
+    if (!fs::exists(directory))
+    {
+      return names;
+    }
+    for (const fs::directory_entry& entry : fs::directory_iterator(directory))
+    {
+      if (entry.path().extension() == ".yaml" && isValidViewName(entry.path().stem().string()))
+      {
+        names.push_back(entry.path().stem().string());
+      }
+    }
+  }
+  catch (const fs::filesystem_error& error)
+  {
+    throw ViewStoreError(std::string("cannot list views: ") + error.what());
+  }
+  std::sort(names.begin(), names.end());
+  return names;
 }
 
 void requireValidName(const std::string& action, const std::string& name)
@@ -611,30 +643,31 @@ ViewStructure ViewStore::loadStructure(const std::string& name) const
   }
 }
 
+std::map<std::string, std::string> ViewStore::revisions() const
+{
+  std::map<std::string, std::string> revisions;
+  for (const std::string& name : findNames(directory_))
+  {
+    try
+    {
+      const std::optional<std::string> text = readFile(yamlPath(directory_, name));
+      if (text && hasGoodChecksum(*text))
+      {
+        revisions.emplace(name, checksum(*text));
+      }
+    }
+    catch (const Damage&)
+    {
+      // It is not a view that can be read.
+    }
+  }
+  return revisions;
+}
+
 ViewStore::Listing ViewStore::list() const
 {
   Listing listing;
-  std::vector<std::string> names;
-  try
-  {
-    if (!fs::exists(directory_))
-    {
-      return listing;
-    }
-    for (const fs::directory_entry& entry : fs::directory_iterator(directory_))
-    {
-      if (entry.path().extension() == ".yaml" && isValidViewName(entry.path().stem().string()))
-      {
-        names.push_back(entry.path().stem().string());
-      }
-    }
-  }
-  catch (const fs::filesystem_error& error)
-  {
-    throw ViewStoreError(std::string("cannot list views: ") + error.what());
-  }
-  std::sort(names.begin(), names.end());
-  for (const std::string& name : names)
+  for (const std::string& name : findNames(directory_))
   {
     try
     {

@@ -10,6 +10,7 @@
 #include <opencv2/core/types.hpp>
 
 #include <filesystem>
+#include <map>
 #include <optional>
 #include <stdexcept>
 #include <string>
@@ -101,6 +102,12 @@ public:
    * there is no such view, or what has been learnt is damaged.
    */
   ViewStructure loadStructure(const std::string& name) const;
+
+  /**
+   * The revision() of each view. Reads no image, and views whose yaml files are damaged are left out. @throws
+   * ViewStoreError when the directory cannot be read.
+   */
+  std::map<std::string, std::string> revisions() const;
 
   struct Damaged
   {
