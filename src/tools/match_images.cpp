@@ -18,6 +18,8 @@
 #include "view_servo/views/scene_matcher.h"
 #include "view_servo/views/scene_motion.h"
 #include "view_servo/views/segment_io.h"
+#include "view_servo/views/view_recognizer.h"
+#include "view_servo/views/view_store.h"
 
 #include <Eigen/Geometry>
 #include <nlohmann/json.hpp>
@@ -29,6 +31,7 @@
 #include <algorithm>
 #include <chrono>
 #include <cmath>
+#include <filesystem>
 #include <fstream>
 #include <iostream>
 #include <iterator>
@@ -41,8 +44,9 @@
 #include <vector>
 
 /** @file
- * `match_images points|lines|scene REF CUR`: matches two image files from the command line. Exit status: 0 a geometry was
- * found, 1 none was found, 2 bad input, with one line on standard error that names the file or option.
+ * `match_images points|lines|scene REF CUR` matches two image files from the command line; `match_images find DIR CUR`
+ * says which of many views an image shows. Exit status: 0 a geometry or a view was found, 1 none was found, 2 bad input,
+ * with one line on standard error that names the file or option.
  */
 namespace
 {
@@ -149,8 +153,9 @@ double meanCornerError(const Eigen::Matrix3d& h, const Eigen::Matrix3d& truth, c
   return sum / 4.0;
 }
 
-template <typename Matcher, typename Params>
-Matcher makeMatcher(const std::vector<std::string>& settings)
+/** The parameters with the values of --set, checked. */
+template <typename Params>
+Params paramsWith(const std::vector<std::string>& settings)
 {
   Params params;
   for (const std::string& setting : settings)
@@ -169,6 +174,13 @@ Matcher makeMatcher(const std::vector<std::string>& settings)
       throw BadInput(std::string("--set: ") + error.what());
     }
   }
+  return params;
+}
+
+template <typename Matcher, typename Params>
+Matcher makeMatcher(const std::vector<std::string>& settings)
+{
+  const auto params = paramsWith<Params>(settings);
   try
   {
     return Matcher(params);
@@ -492,12 +504,112 @@ ExitStatus matchScene(const Options& options)
   return status;
 }
 
-template <typename Params>
-void listParameters(const std::string& subcommand)
+struct FindOptions
 {
-  Params defaults;
-  std::cout << subcommand << ":\n";
-  for (const Parameter& parameter : parameters(defaults))
+  std::string directory;
+  std::string current;
+  std::vector<std::string> settings;
+  int most = 5;
+  int threads = 0;
+  bool json = false;
+};
+
+/** Views of a ViewStore when there are any, else the image files. */
+ViewSource viewsIn(const std::string& directory)
+{
+  std::error_code missing;
+  if (!std::filesystem::is_directory(directory, missing))
+  {
+    throw BadInput("'" + directory + "' is no folder: DIR holds stored views or image files");
+  }
+  const ViewStore store(directory);
+  return store.revisions().empty() ? imageFiles(directory) : storedViews(store);
+}
+
+nlohmann::json toJson(const RecognizedView& view)
+{
+  return { { "view", view.name },
+           { "score", view.score },
+           { "verified", view.verified },
+           { "inliers", view.inliers },
+           { "log_significance", view.log_significance } };
+}
+
+void printText(const std::vector<RecognizedView>& views, std::size_t indexed)
+{
+  if (views.empty())
+  {
+    std::cout << "none of " << indexed << " views has anything in common with the image\n";
+  }
+  for (const RecognizedView& view : views)
+  {
+    std::cout << view.name << ": score " << view.score;
+    if (view.verified)
+    {
+      std::cout << ", verified by " << view.inliers << " matches, significance " << view.log_significance;
+    }
+    else
+    {
+      std::cout << ", not verified";
+    }
+    std::cout << '\n';
+  }
+}
+
+ExitStatus findView(const FindOptions& options)
+{
+  const Stopwatch stopwatch;
+  const auto params = paramsWith<ViewRecognizerParams>(options.settings);
+  if (const std::vector<std::string> faults = params.validate(); !faults.empty())
+  {
+    throw BadInput("--set: " + faults.front());
+  }
+  ViewRecognizer recognizer(viewsIn(options.directory), params);
+  const PreparedImage current(readImage(options.current), cv::Rect(), recognizer.features());
+  recognizer.loadIndex();  // without one, update() reads all views
+  const ViewRecognizer::Update update = [&] {
+    const QuietStandardError quiet;
+    return recognizer.update(std::numeric_limits<std::size_t>::max());
+  }();
+  if (recognizer.size() == 0)
+  {
+    throw BadInput("'" + options.directory + "' holds no stored view and no image file that can be read" +
+                   (update.unreadable.empty() ? "" : ": " + update.unreadable.front()));
+  }
+  const double indexed_ms = stopwatch.elapsedMs();
+  const std::vector<RecognizedView> views = recognizer.recognize(current, static_cast<std::size_t>(options.most), true);
+  const bool found = !views.empty() && views.front().verified;
+  if (options.json)
+  {
+    nlohmann::json json = { { "success", found },
+                            { "message", found ? "the image shows " + views.front().name : "no view is verified" },
+                            { "indexed", recognizer.size() },
+                            { "unreadable", update.unreadable },
+                            { "elapsed_ms",
+                              { { "total", stopwatch.elapsedMs() },
+                                { "index", indexed_ms },
+                                { "recognition", stopwatch.elapsedMs() - indexed_ms } } },
+                            { "views", nlohmann::json::array() } };
+    for (const RecognizedView& view : views)
+    {
+      json["views"].push_back(toJson(view));
+    }
+    std::cout << json << '\n';
+  }
+  else
+  {
+    for (const std::string& reason : update.unreadable)
+    {
+      std::cout << "left out: " << reason << '\n';
+    }
+    printText(views, recognizer.size());
+  }
+  return found ? FOUND : NOTHING_FOUND;
+}
+
+void listParameters(const std::vector<Parameter>& table)
+{
+  for (const Parameter& parameter : table)
   {
     std::cout << "  " << parameter.name << " (" << parameter.type << ", default " << parameter.get()
               << (parameter.unit.empty() ? "" : " " + parameter.unit)
@@ -505,7 +617,16 @@ void listParameters(const std::string& subcommand)
   }
 }
 
+template <typename Params>
+void listParameters(const std::string& subcommand)
+{
+  Params defaults;
+  std::cout << subcommand << ":\n";
+  listParameters(parameters(defaults));
+}
+
 constexpr char STATUSES[] = "Exit status: 0 a geometry was found, 1 none was found, 2 bad input.";
+constexpr char FIND_STATUSES[] = "Exit status: 0 a view was found and verified, 1 none was, 2 bad input.";
 
 template <typename Map>
 std::vector<std::string> namesOf(const Map& map)
@@ -580,6 +701,44 @@ std::optional<Options> readOptions(Subcommand subcommand, int argc, const char* 
   return options;
 }
 
+/** What follows `find`; nothing when help was asked for. */
+std::optional<FindOptions> readFindOptions(int argc, const char* const* argv)
+{
+  FindOptions options;
+  CommandLine line(
+      "match_images find DIR CUR [OPTIONS]: says which of many views an image shows.\n"
+      "DIR is a folder of stored views, or of image files; CUR is what the camera sees now. Of the most likely views "
+      "those "
+      "that the matcher verifies come first.",
+      FIND_STATUSES);
+  line.number("max", options.most, { 1.0, 1000.0 }, "Views to name at most; default: 5");
+  line.flag("json", options.json, "Print the result as one JSON object");
+  line.number("threads", options.threads, { 0.0, 1024.0 }, "Threads to use; 0: one a core");
+  line.list("set", options.settings,
+            "name=value: another value for a parameter; more may follow. See match_images --list-parameters");
+  const std::optional<std::vector<std::string>> words = line.parse(argc, argv);
+  if (!words)
+  {
+    return std::nullopt;
+  }
+  if (words->size() < 2)
+  {
+    throw BadInput(words->empty() ? "DIR, a folder of views, and CUR, the current image, are missing"
+                                  : "CUR, the current image, is missing");
+  }
+  options.directory = (*words)[0];
+  options.current = (*words)[1];
+  for (std::size_t i = 2; i < words->size(); ++i)
+  {
+    if (options.settings.empty())
+    {
+      throw BadInput("'" + (*words)[i] + "' is one word too many: DIR is a folder and CUR an image");
+    }
+    options.settings.push_back((*words)[i]);
+  }
+  return options;
+}
+
 /** Without a subcommand. */
 ExitStatus runWithoutImages(int argc, const char* const* argv)
 {
@@ -589,6 +748,8 @@ ExitStatus runWithoutImages(int argc, const char* const* argv)
       "  match_images points REF CUR [OPTIONS]   by the intensity profiles between corners\n"
       "  match_images lines REF CUR [OPTIONS]    by the structure of groups of line segments\n"
       "  match_images scene REF CUR [OPTIONS]    by both together, for scenes with depth\n"
+      "Says which of many views an image shows:\n"
+      "  match_images find DIR CUR [OPTIONS]\n"
       "  match_images points --help              says which options there are",
       STATUSES);
   line.flag("list-parameters", list_parameters, "Print the names that --set knows, and end");
@@ -599,7 +760,8 @@ ExitStatus runWithoutImages(int argc, const char* const* argv)
   }
   if (!words->empty())
   {
-    throw BadInput("'" + words->front() + "' is unknown: match_images points REF CUR, or lines, or scene, is known");
+    throw BadInput("'" + words->front() +
+                   "' is unknown: match_images points REF CUR, or lines, or scene, or find DIR CUR, is known");
   }
   if (!list_parameters)
   {
@@ -608,11 +770,23 @@ ExitStatus runWithoutImages(int argc, const char* const* argv)
   listParameters<PointViewMatcherParams>("points");
   listParameters<LineMatcherParams>("lines");
   listParameters<SceneMatcherParams>("scene");
+  ViewRecognizerParams recognition;
+  std::cout << "find, beside those of scene:\n";
+  listParameters(recognitionParameters(recognition));
   return FOUND;
 }
 
 ExitStatus run(int argc, const char* const* argv)
 {
+  if (argc > 1 && std::string(argv[1]) == "find")
+  {
+    const std::optional<FindOptions> options = readFindOptions(argc - 1, argv + 1);
+    if (options && options->threads > 0)
+    {
+      cv::setNumThreads(options->threads);
+    }
+    return options ? findView(*options) : FOUND;
+  }
   const auto subcommand = SUBCOMMANDS.find(argc > 1 ? argv[1] : "");
   if (subcommand == SUBCOMMANDS.end())
   {
