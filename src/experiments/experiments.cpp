@@ -17,6 +17,7 @@
 #include "experiments/line_ground_truth.h"
 #include "experiments/lines_table.h"
 #include "experiments/profile_experiments.h"
+#include "experiments/recognition_experiment.h"
 #include "experiments/rooms_experiment.h"
 #include "experiments/structure_experiment.h"
 #include "tools/command_line.h"
@@ -81,6 +82,8 @@ const std::vector<Experiment>& experiments()
       std::nullopt, runRoomsExperiment },
     { "false_answers", "answers for pictures of different scenes, mirrored ones and walls that repeat", true,
       UNRELATED_PAIRS, runFalseAnswersExperiment },
+    { "recognition", "which of many stored views an image shows, beside ORB words", true, UNKNOWN_PICTURES,
+      runRecognitionExperiment },
     { "arm_geometry", "chapter 8: motions from homographies beside a real arm's", true, std::nullopt,
       runArmGeometryExperiment },
     { "cyclic_order", "figures 7.5 to 7.11: cyclic order against plain votes", false, DRAWN_PICTURES,

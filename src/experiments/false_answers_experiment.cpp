@@ -3,6 +3,7 @@
 #include "experiments/false_answers_experiment.h"
 
 #include "experiments/parallel.h"
+#include "experiments/pictures.h"
 #include "view_servo/images/image_io.h"
 #include "view_servo/robust/random.h"
 #include "view_servo/views/line_view_matcher.h"
@@ -18,7 +19,6 @@
 #include <iostream>
 #include <map>
 #include <ostream>
-#include <set>
 #include <stdexcept>
 #include <string>
 #include <tuple>
@@ -49,37 +49,6 @@ struct Answer
 };
 
 // ----------------------------------------------------------------------------------------------------- real pictures
-
-/** The scene that a picture shows: pairs are called nameA and nameB, all others of a folder are of one scene. */
-std::string sceneOf(const fs::path& file)
-{
-  const std::string stem = file.stem().string();
-  if (stem.size() > 1 && (stem.back() == 'A' || stem.back() == 'B'))
-  {
-    return stem.substr(0, stem.size() - 1);
-  }
-  const fs::path folder = file.parent_path();
-  return (folder.filename() == "images" ? folder.parent_path() : folder).filename().string();
-}
-
-/** The pictures below a folder, by scenes. */
-std::map<std::string, std::vector<fs::path>> findPictures(const fs::path& data)
-{
-  const std::set<std::string> endings{ ".jpg", ".pgm", ".png", ".ppm" };
-  std::map<std::string, std::vector<fs::path>> scenes;
-  for (const fs::directory_entry& entry : fs::recursive_directory_iterator(data))
-  {
-    if (entry.is_regular_file() && endings.count(entry.path().extension().string()) != 0)
-    {
-      scenes[sceneOf(entry.path())].push_back(entry.path());
-    }
-  }
-  for (auto& [scene, files] : scenes)
-  {
-    std::sort(files.begin(), files.end());
-  }
-  return scenes;
-}
 
 class Pictures
 {

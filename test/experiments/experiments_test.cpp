@@ -71,8 +71,8 @@ TEST(Experiments, RefusesRunsWhereNothingIsRepeated)
     expectContains(outcome.err, "--runs: " + name + " repeats nothing");
     expectContains(
         outcome.err,
-        "homing, homing_differential, homing_structure, arm, multi_hypothesis, real_pairs, profiles_parameters, view_consistency, "
-        "false_answers, cyclic_order do");
+        "homing, homing_differential, homing_structure, arm, multi_hypothesis, real_pairs, profiles_parameters, "
+        "view_consistency, false_answers, recognition, cyclic_order do");
   }
 }
 

@@ -4,6 +4,7 @@
 #include "view_servo/views/line_view_matcher.h"
 #include "view_servo/views/point_view_matcher.h"
 #include "view_servo/views/scene_matcher.h"
+#include "view_servo/views/view_recognizer.h"
 
 #include <gtest/gtest.h>
 
@@ -20,13 +21,14 @@ using view_servo::Parameter;
 using view_servo::PointViewMatcherParams;
 using view_servo::SceneMatcherParams;
 using view_servo::setParameter;
+using view_servo::ViewRecognizerParams;
 
 template <typename Params>
 class MatcherParameters : public ::testing::Test
 {
 };
 
-using Matchers = ::testing::Types<PointViewMatcherParams, LineMatcherParams, SceneMatcherParams>;
+using Matchers = ::testing::Types<PointViewMatcherParams, LineMatcherParams, SceneMatcherParams, ViewRecognizerParams>;
 TYPED_TEST_SUITE(MatcherParameters, Matchers, );
 
 TYPED_TEST(MatcherParameters, HaveUniqueDocumentedNames)
