@@ -140,7 +140,7 @@ std::uint32_t ViewIndex::leafOf(const BinaryWord& word) const
 
 void ViewIndex::insert(std::uint32_t leaf, const Entry& entry)
 {
-  constexpr std::size_t STEP = 8;  // memory for this many words is allocated at a time: doubling would waste too much
+  constexpr std::size_t STEP = 4;  // memory for this many words is allocated at a time: doubling would waste too much
   std::vector<Entry>& entries = nodes_[leaf].entries;
   if (entries.size() == entries.capacity())
   {
