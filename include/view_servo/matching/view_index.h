@@ -18,11 +18,10 @@ namespace view_servo
 /** Options of a ViewIndex. */
 struct ViewIndexParams
 {
-  int leaf_words = 64;  ///< more words in one leaf are divided among `branches` new ones
-  int branches = 4;     ///< children of a node
-  int checked_words =
-      1000;               ///< stored words that one word of a query is compared with, at least, where there are so many
-  int max_distance = 64;  ///< bits in which words of one patch differ at most
+  int leaf_words = 64;       ///< more words in one leaf are divided among `branches` new ones
+  int branches = 4;          ///< children of a node
+  int checked_words = 1000;  ///< stored words that each word of a query is compared with, where there are so many
+  int max_distance = 64;     ///< bits in which words of one patch differ at most
 
   /** Each fault in one line; empty when the parameters are usable. */
   std::vector<std::string> validate() const;
