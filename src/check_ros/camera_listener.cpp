@@ -171,7 +171,7 @@ std::vector<ros::Time> CameraListener::stamps() const
 {
   const std::lock_guard<std::mutex> lock(mutex_);
   std::vector<ros::Time> stamps;
-  for (const sensor_msgs::ImageConstPtr& image : last_images_)
+  for (const CameraImageConstPtr& image : last_images_)
   {
     stamps.push_back(image->header.stamp);
   }

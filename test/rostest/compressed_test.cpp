@@ -118,6 +118,7 @@ protected:
   ros::Publisher images_ = nh_.advertise<sensor_msgs::CompressedImage>(IMAGES, 10);
   ros::Publisher infos_ = nh_.advertise<sensor_msgs::CameraInfo>("camera/camera_info", 10);
   Recorder<PointMatches> matches_{ "point_matcher/point_matches" };
+  Recorder<rosgraph_msgs::Log> log_{ "/rosout" };  // what it misses at first is told again only after 10 s
   std::set<ros::Time> sent_;
 };
 
@@ -130,9 +131,8 @@ TEST_F(CompressedTest, ImagesAreStoredAndMatchedAndDamagedOnesLeftOut)
   expectMatches();
 
   // What comes between good images ends nothing.
-  const Recorder<rosgraph_msgs::Log> log("/rosout");
   const auto told = [&](const std::string& words) {
-    const auto messages = log.messages();
+    const auto messages = log_.messages();
     return std::any_of(messages.begin(), messages.end(), [&](const rosgraph_msgs::Log& message) {
       return message.msg.find(words) != std::string::npos && message.msg.find("/" + IMAGES) != std::string::npos;
     });
