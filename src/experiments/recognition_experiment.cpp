@@ -10,6 +10,7 @@
 #include "view_servo/features/binary_features.h"
 #include "view_servo/images/image_io.h"
 #include "view_servo/matching/view_index.h"
+#include "view_servo/robust/quantile.h"
 #include "view_servo/robust/random.h"
 #include "view_servo/views/prepared_image.h"
 #include "view_servo/views/view_recognizer.h"
@@ -475,7 +476,7 @@ void measureRecall(const Places& places, const std::vector<cv::Mat>& unrelated, 
       table.add("recall@" + std::to_string(most), places.set, method, light, ranks.size(),
                 static_cast<double>(found) / static_cast<double>(ranks.size()));
     }
-    table.add("query with features [ms]", places.set, method, light, ranks.size(), median(ms));
+    table.add("query with features [ms]", places.set, method, light, ranks.size(), medianOf(ms));
   }
 }
 
