@@ -85,7 +85,7 @@ TEST_F(LearningTest, LearnsAViewWhileTheBaseIsDrivenAway)
   ASSERT_TRUE(waitUntil([this] { return wanted_.last() && wanted_.last()->view == "learnt"; }));
   EXPECT_TRUE(wanted_.last()->goal.empty());
   EXPECT_EQ(pointsLearnt(), 0U);
-  ASSERT_TRUE(waitUntil([this] { return headings_.last() && headings_.last()->state != Heading::ACQUIRING; }));
+  ASSERT_TRUE(waitUntil([this] { return headings_.last() && std::isfinite(headings_.last()->heading); }));
 
   ASSERT_TRUE(driveBack(0.4));
   EXPECT_TRUE(waitUntil([this] { return pointsLearnt() >= 30; })) << pointsLearnt();
