@@ -891,7 +891,7 @@ TEST(ServoHoming, KnowsTheDistanceFromTheFirstMatchesOnOnceTheViewIsLearnt)
   Drive misled(walls, servoParams(), { -0.5, -0.3, -0.1 }, target);
   misled.runFor(60.0);
   EXPECT_EQ(misled.report().state, HomingState::ARRIVED) << misled.report().reason;
-  EXPECT_LT(misled.base().distance(), 0.005);
+  EXPECT_LT(misled.base().distance(), 0.01);  // as much as moves the view's points by 1.5 px
 }
 
 TEST(ServoHoming, ForgetsPointsThatAreNotSeenAtTheView)

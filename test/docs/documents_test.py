@@ -56,6 +56,7 @@ KNOWN_NAMES = {
     "src": "of a catkin workspace",
     "$ROS_HOME/view_servo/views": "a directory of the user's",
     "NAME.yaml": "a file of the user's",
+    "NAME.REVISION.points": "what was learnt of a view",
     "<depend>view_servo</depend>": "a line of the user's package.xml",
     "camera_calibration": "a package of ROS that need not be installed",
     "clang-format": "a tool",
@@ -297,9 +298,10 @@ class Documented(unittest.TestCase):
         if program == "view":
             self.try_view(arguments)
             return
-        if set(arguments) & {"...", "NAME", "name=value"} or arguments[-1].startswith("-") and len(arguments) > 1:
+        subcommand = [word for word in arguments[:1] if word in ("points", "lines", "scene", "find")]
+        if set(arguments) & {"...", "NAME", "DIR", "name=value"} or arguments == subcommand or (
+                arguments[-1].startswith("-") and len(arguments) > 1):
             options = [word for word in arguments if word.startswith("-")]  # a form: its options have to be there
-            subcommand = [word for word in arguments[:1] if word in ("points", "lines")]
             text = self.run_here(" ".join(["rosrun", package, program] + subcommand + ["--help"]))
             if not subcommand and program == "match_images":
                 text += self.run_here("rosrun view_servo match_images points --help")
@@ -328,7 +330,7 @@ class Documented(unittest.TestCase):
         """Against the running nodes; a form, such as one with NAME, has commands and options that --help knows."""
         command = "rosrun view_servo view "
         commands = arguments[0].split("|")
-        if len(commands) > 1 or "NAME" in arguments or "--help" in arguments:
+        if len(commands) > 1 or "NAME" in arguments or "--help" in arguments or arguments in (["save"], ["show"], ["go"]):
             known = self.run_here(command + "--help")
             for name in commands:
                 self.assertIn(("    %s " if name.isalpha() else "%s") % name, known)
@@ -452,6 +454,9 @@ class Documented(unittest.TestCase):
                 for key, value in yaml.safe_load(file).items():
                     names.add(key)
                     names.update(value if isinstance(value, dict) else [])
+        for text in self.source_files().values():
+            for prefix in re.findall(r"prefixed\(\"(\w+)\"", text):
+                names.update([prefix + name for name in names])
         for row in self.document("docs/parameters.md").rows + self.document("docs/parameters_of_drivers.md").rows:
             names.update(re.findall(r"\w+", row.cells[1]))  # values that words stand for
         return names
