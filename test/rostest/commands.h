@@ -30,9 +30,13 @@ inline bool moves(const geometry_msgs::TwistStamped& message)
   return moves(message.twist);
 }
 
+/** The larger one of speed [m/s] and turn rate [rad/s]. */
 inline double speedOf(const geometry_msgs::Twist& twist)
 {
-  return std::hypot(twist.linear.x, std::hypot(twist.linear.y, twist.linear.z));
+  const auto norm = [](const geometry_msgs::Vector3& v) {
+    return std::hypot(v.x, std::hypot(v.y, v.z));
+  };
+  return std::max(norm(twist.linear), norm(twist.angular));
 }
 
 inline double speedOf(const geometry_msgs::TwistStamped& message)
@@ -81,7 +85,7 @@ public:
     }
     return -1.0;
   }
-  /** The largest speed commanded since a moment [m/s]. */
+  /** The largest speed or turn rate commanded since a moment [m/s, rad/s]. */
   double fastestAfter(Clock::time_point moment) const
   {
     const std::lock_guard<std::mutex> lock(mutex_);

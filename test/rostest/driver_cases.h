@@ -163,15 +163,16 @@ TYPED_TEST_P(DriverCases, GivesUpInTime)
 
 TYPED_TEST_P(DriverCases, KeepsLimitsThatPeopleChangeWhileItDrives)
 {
-  constexpr double SLOW = 0.002;  // [m/s]
+  constexpr double SLOW = 0.002;  // [m/s, rad/s]
   constexpr std::chrono::milliseconds AT_ONCE(static_cast<int>(100.0 * SLOWDOWN));
   this->drive();
   const std::string service = this->ns_ + "/" + TypeParam::DRIVER + "/set_parameters";
-  const auto set = [&](double max_speed) {
+  const auto set = [&](double most) {
     dynamic_reconfigure::Reconfigure change;
-    change.request.config.doubles.resize(1);
+    change.request.config.doubles.resize(2);
     change.request.config.doubles[0].name = "max_speed";
-    change.request.config.doubles[0].value = max_speed;
+    change.request.config.doubles[1].name = "max_turn_rate";
+    change.request.config.doubles[0].value = change.request.config.doubles[1].value = most;
     EXPECT_TRUE(callService(service, change.request, change.response));
     EXPECT_EQ(change.response.config.doubles.size(), 4U);
     return change.response.config.doubles.empty() ? 0.0 : change.response.config.doubles[0].value;
