@@ -376,4 +376,4 @@ class ViewCommands(graph.GraphTest):
 
 
 if __name__ == "__main__":
-    unittest.main(verbosity=2)
+    unittest.main(verbosity=2, warnings="ignore")  # ROS leaves sockets to the end
