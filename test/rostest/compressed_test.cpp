@@ -2,14 +2,13 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "child_process.h"
 #include "node_test.h"
+#include "store_from_camera.h"
 #include "support/compressed_image.h"
 #include "support/temporary_directory.h"
 #include "test_paths.h"
 
-#include "view_servo/GetView.h"
 #include "view_servo/MatchPoints.h"
 #include "view_servo/PointMatches.h"
-#include "view_servo/SaveView.h"
 #include "view_servo/SetView.h"
 #include "view_servo/ros/call_service.h"
 
@@ -82,20 +81,7 @@ protected:
   /** Stores the picture from the camera, not what it sent before. */
   void teach(const std::string& name)
   {
-    SaveView::Request request;
-    request.name = name;
-    request.overwrite = true;
-    GetView::Request stored;
-    stored.name = name;
-    SaveView::Response response;
-    const ros::Time start = ros::Time::now();
-    EXPECT_TRUE(waitUntil(
-        [&] {
-          response = call<SaveView>("view_store/save", request);
-          return response.success && call<GetView>("view_store/get", stored).image.header.stamp > start;
-        },
-        [&] { send(picture_); }))
-        << response.message;
+    storeFromCamera("view_store", name, [&] { send(picture_); });
   }
 
   /** Waits until an image that is sent from now on is matched with the view, and looks at the homography. */

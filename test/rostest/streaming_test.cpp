@@ -1,9 +1,9 @@
 // Copyright (c) 2026, the view_servo authors
 // SPDX-License-Identifier: BSD-3-Clause
 #include "node_test.h"
+#include "store_from_camera.h"
 
 #include "view_servo/DeleteView.h"
-#include "view_servo/GetView.h"
 #include "view_servo/MatchPoints.h"
 #include "view_servo/PointMatches.h"
 #include "view_servo/SaveView.h"
@@ -107,20 +107,7 @@ protected:
     /** Stores `image` from the camera, as a user does; not one that the camera took before. */
     void teach(const std::string& view, const cv::Mat& image)
     {
-      SaveView::Request request;
-      request.name = view;
-      request.overwrite = true;
-      GetView::Request stored;
-      stored.name = view;
-      SaveView::Response response;
-      const ros::Time start = ros::Time::now();
-      EXPECT_TRUE(waitUntil(
-          [&] {
-            response = call<SaveView>("view_store/save", request);
-            return response.success && call<GetView>("view_store/get", stored).image.header.stamp > start;
-          },
-          [&] { send(image); }))
-          << response.message;
+      storeFromCamera(name + "/view_store", view, [&] { send(image); });
     }
 
     std::string name;
