@@ -520,7 +520,7 @@ void measureVerification(const Places& places, const std::vector<cv::Mat>& unrel
       const Places::Query& query = places.queries[i];
       const PreparedImage image(other_light ? inOtherLight(query.image) : query.image, cv::Rect(),
                                 recognizer.features());
-      for (const RecognizedView& view : recognizer.recognize(image, 1, true))
+      for (const CandidateView& view : recognizer.recognize(image, 1, true))
       {
         const bool known = query.ignored.count(view.name) != 0;
         right[i] += view.verified && query.right.count(view.name) != 0 ? 1 : 0;
@@ -544,7 +544,7 @@ void measureVerification(const Places& places, const std::vector<cv::Mat>& unrel
     Rng rng(context.seedOf(UNKNOWN_PICTURES, i));
     const cv::Mat picture = changed(unrelated[uniformIndex(rng, unrelated.size())], rng);
     const PreparedImage image(picture, cv::Rect(), walk.features());
-    const std::vector<RecognizedView> views = walk.recognize(image, 1, true);
+    const std::vector<CandidateView> views = walk.recognize(image, 1, true);
     wrong[i] = !views.empty() && views.front().verified ? 1 : 0;
   });
   table.add("verified wrong", "unknown pictures", "view recognizer", "changed", unknown,

@@ -47,4 +47,28 @@ std::vector<std::string> HomographyTrackerNodeParams::validate() const
   return faults.list();
 }
 
+std::vector<Parameter> nodeParameters(ViewRecognizerNodeParams& params)
+{
+  return joined({
+      { real("rate", params.rate, "Hz", ">= 0.001",
+             "camera images are recognized at most this often, always the newest") },
+      parameters(params.sources),
+      parameters(params.camera),
+  });
+}
+
+std::vector<Parameter> parameters(ViewRecognizerNodeParams& params)
+{
+  return joined({ nodeParameters(params), parameters(params.recognition) });
+}
+
+std::vector<std::string> ViewRecognizerNodeParams::validate() const
+{
+  ViewRecognizerNodeParams copy = *this;
+  Faults faults;
+  faults.add(faultsOf(nodeParameters(copy)));
+  faults.add(recognition.validate());
+  return faults.list();
+}
+
 }  // namespace view_servo

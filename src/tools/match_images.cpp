@@ -526,7 +526,7 @@ ViewSource viewsIn(const std::string& directory)
   return store.revisions().empty() ? imageFiles(directory) : storedViews(store);
 }
 
-nlohmann::json toJson(const RecognizedView& view)
+nlohmann::json toJson(const CandidateView& view)
 {
   return { { "view", view.name },
            { "score", view.score },
@@ -535,13 +535,13 @@ nlohmann::json toJson(const RecognizedView& view)
            { "log_significance", view.log_significance } };
 }
 
-void printText(const std::vector<RecognizedView>& views, std::size_t indexed)
+void printText(const std::vector<CandidateView>& views, std::size_t indexed)
 {
   if (views.empty())
   {
     std::cout << "none of " << indexed << " views has anything in common with the image\n";
   }
-  for (const RecognizedView& view : views)
+  for (const CandidateView& view : views)
   {
     std::cout << view.name << ": score " << view.score;
     if (view.verified)
@@ -577,7 +577,7 @@ ExitStatus findView(const FindOptions& options)
                    (update.unreadable.empty() ? "" : ": " + update.unreadable.front()));
   }
   const double indexed_ms = stopwatch.elapsedMs();
-  const std::vector<RecognizedView> views = recognizer.recognize(current, static_cast<std::size_t>(options.most), true);
+  const std::vector<CandidateView> views = recognizer.recognize(current, static_cast<std::size_t>(options.most), true);
   const bool found = !views.empty() && views.front().verified;
   if (options.json)
   {
@@ -590,7 +590,7 @@ ExitStatus findView(const FindOptions& options)
                                 { "index", indexed_ms },
                                 { "recognition", stopwatch.elapsedMs() - indexed_ms } } },
                             { "views", nlohmann::json::array() } };
-    for (const RecognizedView& view : views)
+    for (const CandidateView& view : views)
     {
       json["views"].push_back(toJson(view));
     }

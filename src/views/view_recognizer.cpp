@@ -233,8 +233,8 @@ std::shared_ptr<const PreparedImage> ViewRecognizer::prepared(const std::string&
   return image;
 }
 
-std::vector<RecognizedView> ViewRecognizer::recognize(const PreparedImage& image, std::size_t most, bool verify,
-                                                      const std::function<bool()>& given_up) const
+std::vector<CandidateView> ViewRecognizer::recognize(const PreparedImage& image, std::size_t most, bool verify,
+                                                     const std::function<bool()>& given_up) const
 {
   const std::vector<BinaryFeature> features = detectBinaryFeatures(image.grey(), image.region(), params_.features);
   const auto candidates = static_cast<std::size_t>(params_.candidates);
@@ -243,11 +243,11 @@ std::vector<RecognizedView> ViewRecognizer::recognize(const PreparedImage& image
     const std::lock_guard<std::mutex> lock(mutex_);
     likely = index_.query(features, verify ? std::max(most, candidates) : most);
   }
-  std::vector<RecognizedView> views;
+  std::vector<CandidateView> views;
   std::size_t verified = 0;
   for (const ScoredView& candidate : likely)
   {
-    RecognizedView view;
+    CandidateView view;
     view.name = candidate.name;
     view.score = candidate.score;
     const bool over = verified >= most || views.size() >= candidates || (given_up && given_up());
@@ -265,7 +265,7 @@ std::vector<RecognizedView> ViewRecognizer::recognize(const PreparedImage& image
     }
     views.push_back(std::move(view));
   }
-  std::stable_partition(views.begin(), views.end(), [](const RecognizedView& view) { return view.verified; });
+  std::stable_partition(views.begin(), views.end(), [](const CandidateView& view) { return view.verified; });
   views.resize(std::min(most, views.size()));
   return views;
 }

@@ -93,7 +93,7 @@ class Documented(unittest.TestCase):
         wanted = [
             (["nomad_sim.launch", "homing.launch"], ["/nomad_sim/set_pose", "/homing/enable", "/view_store/save",
                                                      "/point_matcher/match", "/line_matcher/match",
-                                                     "/scene_matcher/match"]),
+                                                     "/scene_matcher/match", "/view_recognizer/recognize"]),
             (["puma_sim.launch", "arm_servo.launch"], ["/puma_sim/set_pose", "/servo_25d/enable", "/view_store/save",
                                                        "/homography_tracker/start"]),
         ]
@@ -107,6 +107,7 @@ class Documented(unittest.TestCase):
         # The drivers' launch files leave it out.
         cls.graphs[0].start("rosrun", PACKAGE, "scene_matcher", "image_raw:=camera/image_raw", "camera_info:=camera/camera_info",
                             "wanted_view:=homing/wanted_view")
+        cls.graphs[0].start("rosrun", PACKAGE, "view_recognizer", "image_raw:=camera/image_raw", "camera_info:=camera/camera_info")
         for running, (_, services) in zip(cls.graphs, wanted):
             try:
                 for service in services:

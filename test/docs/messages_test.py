@@ -76,6 +76,9 @@ NOT_FOR_USERS = {
         r"%.2f mm and %.3f degrees from the view",
         r", if its plane is .*",
         r"images arrive",
+        r" are in the index",
+        r" +views are indexed",
+        r"no image was looked at",
     ],
     "it says what was done or found as it was asked for": [
         r"camera images are (not matched|matched with view .*)",

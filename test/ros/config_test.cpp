@@ -47,6 +47,7 @@ public:
   HomographyTrackerNodeParams tracker;
   ServoDriverParams servo;
   ViewStoreNodeParams store;
+  ViewRecognizerNodeParams recognizer;
   sim::SimulationParams simulation;
   sim::NomadParams nomad;
   sim::PumaParams puma;
@@ -74,6 +75,10 @@ public:
       { "scene_matcher",
         { { "the node", parameters(scene_node) },
           { "matching; these are also names of `match_images scene --set name=value`", parameters(scene) } } },
+      { "view_recognizer",
+        { { "the node", nodeParameters(recognizer) },
+          { "recognition; its verification has the parameters of scene_matcher as well",
+            recognitionParameters(recognizer.recognition) } } },
       { "homing", { { "the node, homing and the base", parameters(homing) } } },
       { "homography_tracker", { { "the node and tracking", parameters(tracker) } } },
       { "servo_25d", { { "the node, servoing and the camera's motion", parameters(servo) } } },

@@ -7,6 +7,7 @@
 #include "view_servo/Homography.h"
 #include "view_servo/LineMatches.h"
 #include "view_servo/PointMatches.h"
+#include "view_servo/RecognizedViews.h"
 #include "view_servo/SceneMatches.h"
 #include "view_servo/ServoStatus.h"
 #include "view_servo/ros/conversions.h"
@@ -118,6 +119,10 @@ inline bool givesReason(const LineMatches& message)
 inline bool givesReason(const SceneMatches& message)
 {
   return !message.found.empty() || !message.reason.empty();
+}
+inline bool givesReason(const RecognizedViews& message)
+{
+  return !message.reason.empty() || (!message.views.empty() && message.views[0].verified != 0);
 }
 inline bool givesReason(const ServoStatus& message)
 {

@@ -19,9 +19,9 @@
 
 namespace
 {
+using view_servo::CandidateView;
 using view_servo::imageFiles;
 using view_servo::PreparedImage;
-using view_servo::RecognizedView;
 using view_servo::StoredView;
 using view_servo::storedViews;
 using view_servo::ViewRecognizer;
@@ -72,7 +72,7 @@ protected:
 
   static std::string best(const ViewRecognizer& recognizer, std::uint64_t scene)
   {
-    const std::vector<RecognizedView> views = recognizer.recognize(seen(recognizer, scene), 1, false);
+    const std::vector<CandidateView> views = recognizer.recognize(seen(recognizer, scene), 1, false);
     return views.empty() ? "" : views.front().name;
   }
 
@@ -91,7 +91,7 @@ TEST_F(ViewRecognizerTest, VerifiesTheViewThatTheImageShows)
   EXPECT_EQ(recognizer.size(), VIEWS);
   for (const std::uint64_t scene : { 2U, 5U })
   {
-    const std::vector<RecognizedView> views = recognizer.recognize(seen(recognizer, scene), 2, true);
+    const std::vector<CandidateView> views = recognizer.recognize(seen(recognizer, scene), 2, true);
     ASSERT_FALSE(views.empty());
     EXPECT_EQ(views[0].name, "view" + std::to_string(scene));
     EXPECT_TRUE(views[0].verified);
@@ -107,7 +107,7 @@ TEST_F(ViewRecognizerTest, VerifiesNoViewForAnUnknownScene)
 {
   ViewRecognizer recognizer(storedViews(store_), params());
   recognizer.update(ALL);
-  for (const RecognizedView& view : recognizer.recognize(seen(recognizer, 100), 3, true))
+  for (const CandidateView& view : recognizer.recognize(seen(recognizer, 100), 3, true))
   {
     EXPECT_FALSE(view.verified) << view.name;
     EXPECT_EQ(view.inliers, 0);
@@ -120,7 +120,7 @@ TEST_F(ViewRecognizerTest, GivesUpWhenAsked)
 {
   ViewRecognizer recognizer(storedViews(store_), params());
   recognizer.update(ALL);
-  const std::vector<RecognizedView> views = recognizer.recognize(seen(recognizer, 2), 1, true, [] { return true; });
+  const std::vector<CandidateView> views = recognizer.recognize(seen(recognizer, 2), 1, true, [] { return true; });
   ASSERT_EQ(views.size(), 1U);
   EXPECT_FALSE(views[0].verified);
 }

@@ -7,6 +7,7 @@
 #include "view_servo/ros/image_source.h"
 #include "view_servo/ros/session_starter.h"
 #include "view_servo/views/point_view_matcher.h"
+#include "view_servo/views/view_recognizer.h"
 
 #include <string>
 #include <vector>
@@ -41,5 +42,22 @@ struct HomographyTrackerNodeParams
 };
 
 std::vector<Parameter> parameters(HomographyTrackerNodeParams& params);
+
+/** Parameters of the node view_recognizer. */
+struct ViewRecognizerNodeParams
+{
+  CameraInputParams camera;
+  ImageSourceParams sources;
+  double rate = 1.0;  ///< camera images are recognized at most this often [Hz]
+  ViewRecognizerParams recognition;
+
+  /** Each fault in one line, those of nested parameters included; empty when the parameters are usable. */
+  std::vector<std::string> validate() const;
+};
+
+std::vector<Parameter> parameters(ViewRecognizerNodeParams& params);
+
+/** The same without those of the recognition. */
+std::vector<Parameter> nodeParameters(ViewRecognizerNodeParams& params);
 
 }  // namespace view_servo

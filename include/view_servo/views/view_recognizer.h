@@ -56,7 +56,7 @@ ViewSource storedViews(const ViewStore& store);
 ViewSource imageFiles(const std::filesystem::path& directory);
 
 /** A view that an image may show. */
-struct RecognizedView
+struct CandidateView
 {
   std::string name;
   double score = 0.0;             ///< as ScoredView::score
@@ -107,8 +107,8 @@ public:
    * @param verify whether to match the image with the candidates, until `most` are verified.
    * @param given_up asked now and then; once it is true, no further candidate is verified. May be empty.
    */
-  std::vector<RecognizedView> recognize(const PreparedImage& image, std::size_t most, bool verify,
-                                        const std::function<bool()>& given_up = {}) const;
+  std::vector<CandidateView> recognize(const PreparedImage& image, std::size_t most, bool verify,
+                                       const std::function<bool()>& given_up = {}) const;
 
   /** Where saveIndex() and loadIndex() keep the index: beside the views. */
   std::filesystem::path indexFile() const;

@@ -1,0 +1,206 @@
+// Copyright (c) 2026, the view_servo authors
+// SPDX-License-Identifier: BSD-3-Clause
+#include "node_test.h"
+#include "support/room_corner.h"
+
+#include "view_servo/RecognizeView.h"
+#include "view_servo/RecognizedViews.h"
+#include "view_servo/ros/call_service.h"
+#include "view_servo/views/view_store.h"
+
+#include <gtest/gtest.h>
+#include <ros/time.h>
+#include <sensor_msgs/CameraInfo.h>
+#include <sensor_msgs/image_encodings.h>
+#include <opencv2/core.hpp>
+
+#include <filesystem>
+#include <string>
+#include <utility>
+
+namespace view_servo
+{
+namespace test
+{
+namespace
+{
+const std::string NODE = "view_recognizer";
+
+class ViewRecognizerNodeTest : public ::testing::Test
+{
+protected:
+  static void SetUpTestSuite()
+  {
+    ASSERT_TRUE(waitForService(NODE + "/recognize"));
+    for (int i = 0; i < 6; ++i)
+    {
+      saveView(nameOf(i), texturedPicture(pictureOf(i)));
+    }
+  }
+
+  static void TearDownTestSuite()
+  {
+    removeViews(NODE);
+  }
+
+  static std::string nameOf(int i)
+  {
+    return "place_" + std::to_string(i);
+  }
+
+  static unsigned pictureOf(int i)
+  {
+    return 20U + static_cast<unsigned>(i);
+  }
+
+  static ViewStore store()
+  {
+    return ViewStore(viewsDir(NODE));
+  }
+
+  static void saveView(const std::string& name, const cv::Mat& image)
+  {
+    StoredView view;
+    view.name = name;
+    view.image = image;
+    store().save(view, true);
+  }
+
+  static RecognizeView::Request requestOf(const cv::Mat& image)
+  {
+    RecognizeView::Request request;
+    request.image.image = toMono8(image);
+    request.verify = true;
+    return request;
+  }
+
+  static RecognizeView::Response call(RecognizeView::Request request)
+  {
+    RecognizeView::Response response;
+    EXPECT_TRUE(callService(NODE + "/recognize", request, response)) << "the node did not answer";
+    return response;
+  }
+
+  /** What a camera elsewhere sees of the picture of a view. */
+  static cv::Mat seen(int i)
+  {
+    return viewThrough(texturedPicture(pictureOf(i)), exampleHomography());
+  }
+};
+
+TEST_F(ViewRecognizerNodeTest, NamesTheViewThatAnImageShows)
+{
+  for (const int i : { 0, 3, 5 })
+  {
+    SCOPED_TRACE(i);
+    const RecognizeView::Response response = call(requestOf(seen(i)));
+    EXPECT_TRUE(response.success) << response.message;
+    ASSERT_EQ(response.views.size(), 1U);
+    EXPECT_EQ(response.views[0].view, nameOf(i));
+    EXPECT_TRUE(response.views[0].verified);
+    EXPECT_GT(response.views[0].inliers, 20);
+    EXPECT_NE(response.message.find(nameOf(i)), std::string::npos) << response.message;
+    EXPECT_GT(response.elapsed_ms, 0.0);
+  }
+}
+
+TEST_F(ViewRecognizerNodeTest, RanksViewsWithoutVerification)
+{
+  RecognizeView::Request request = requestOf(seen(2));
+  request.verify = false;
+  request.max_results = 3;
+  const RecognizeView::Response response = call(request);
+  EXPECT_TRUE(response.success) << response.message;
+  ASSERT_FALSE(response.views.empty());
+  EXPECT_LE(response.views.size(), 3U);
+  EXPECT_EQ(response.views[0].view, nameOf(2));
+  for (const RecognizedView& view : response.views)
+  {
+    EXPECT_FALSE(view.verified);
+    EXPECT_EQ(view.inliers, 0);
+    EXPECT_LE(view.score, response.views[0].score);
+  }
+}
+
+TEST_F(ViewRecognizerNodeTest, SaysThatAnImageShowsNoView)
+{
+  for (const cv::Mat& image : { texturedPicture(99), cv::Mat(360, 480, CV_8UC1, cv::Scalar(90)) })
+  {
+    const RecognizeView::Response response = call(requestOf(image));
+    EXPECT_FALSE(response.success);
+    EXPECT_NE(response.message, "");
+    for (const RecognizedView& view : response.views)
+    {
+      EXPECT_FALSE(view.verified);
+    }
+  }
+}
+
+TEST_F(ViewRecognizerNodeTest, RefusesBadRequestsAndGoesOn)
+{
+  RecognizeView::Request negative = requestOf(seen(1));
+  negative.max_results = -1;
+  RecognizeView::Request missing;
+  missing.image.path = "/nowhere/picture.png";
+  RecognizeView::Request twofold = requestOf(seen(1));
+  twofold.image.view = nameOf(1);
+  for (const auto& [request, naming] :
+       { std::make_pair(negative, "max_results"), std::make_pair(missing, "/nowhere/picture.png"),
+         std::make_pair(twofold, "image") })
+  {
+    const RecognizeView::Response response = call(request);
+    EXPECT_FALSE(response.success);
+    EXPECT_NE(response.message.find(naming), std::string::npos) << response.message;
+    EXPECT_EQ(response.message.find('\n'), std::string::npos) << response.message;
+  }
+  EXPECT_TRUE(call(requestOf(seen(1))).success);
+}
+
+TEST_F(ViewRecognizerNodeTest, KnowsWhatWasSavedChangedAndDeletedAMomentAgo)
+{
+  const cv::Mat image = viewThrough(texturedPicture(50), exampleHomography());
+  EXPECT_FALSE(call(requestOf(image)).success);
+  saveView("guest", texturedPicture(50));
+  EXPECT_EQ(call(requestOf(image)).views.at(0).view, "guest");
+  saveView("guest", texturedPicture(51));
+  EXPECT_FALSE(call(requestOf(image)).success);
+  store().remove("guest");
+  EXPECT_FALSE(call(requestOf(viewThrough(texturedPicture(51), exampleHomography()))).success);
+  // Beside the views, for the node's next start.
+  EXPECT_TRUE(waitUntil([] { return std::filesystem::exists(store().directory() / "views.index"); }));
+}
+
+TEST_F(ViewRecognizerNodeTest, RecognizesWhatTheCameraSees)
+{
+  FakeCamera camera("camera");
+  ASSERT_TRUE(camera.waitForSubscribers(1));
+  const Recorder<RecognizedViews> recognized(NODE + "/recognized");
+  const cv::Mat image = seen(4);
+  const auto send = [&](const cv::Mat& picture) {
+    const sensor_msgs::CameraInfo info = camera.infoOf(picture, ros::Time::now());
+    camera.publish(toImage(picture, sensor_msgs::image_encodings::MONO8, info.header), info);
+  };
+  ASSERT_TRUE(waitUntil([&] { return recognized.last().has_value(); }, [&] { send(image); }));
+  EXPECT_EQ(recognized.last()->header.frame_id, camera.frame_id);
+  EXPECT_EQ(recognized.last()->reason, "");
+  ASSERT_FALSE(recognized.last()->views.empty());
+  EXPECT_EQ(recognized.last()->views[0].view, nameOf(4));
+  EXPECT_TRUE(recognized.last()->views[0].verified);
+
+  const cv::Mat blank(image.size(), CV_8UC1, cv::Scalar(100));
+  EXPECT_TRUE(waitUntil([&] { return !recognized.last()->reason.empty(); }, [&] { send(blank); }));
+
+  RecognizeView::Request latest;
+  latest.verify = true;
+  send(image);
+  EXPECT_TRUE(waitUntil([&] { return call(latest).success; }, [&] { send(image); }));
+}
+
+}  // namespace
+}  // namespace test
+}  // namespace view_servo
+
+int main(int argc, char** argv)
+{
+  return view_servo::test::runTests(argc, argv, "view_recognizer_test");
+}
