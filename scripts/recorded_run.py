@@ -83,7 +83,7 @@ def yaw_of_optical(q):
 
 
 def read_homing(bag):
-    """A mobile base's run; None without headings. Its times begin with the first heading."""
+    """A mobile base's run; None without headings. Its times begin with the first heading, at "start" by the bag's clock."""
     topics = bag.get_type_and_topic_info().topics
     topic = find_topic(topics, "view_servo/Heading", "heading")
     if topic is None:
@@ -106,7 +106,9 @@ def read_homing(bag):
         "reason": lambda m: str(m.reason),
         "translation_error": lambda m: m.translation_error,
     })
-    command = table("geometry_msgs/TwistStamped", "cmd_vel_stamped", {
+    # In a dry run the commands go to the other topic.
+    has_commands = find_topic(topics, "geometry_msgs/TwistStamped", "cmd_vel_stamped", topic) is not None
+    command = table("geometry_msgs/TwistStamped", "cmd_vel_stamped" if has_commands else "cmd_vel_dry_stamped", {
         "ahead": lambda m: m.twist.linear.x,
         "left": lambda m: m.twist.linear.y,
         "turn": lambda m: m.twist.angular.z,
@@ -132,7 +134,9 @@ def read_homing(bag):
         path["yaw"] = np.unwrap(path["yaw"])
     has_truth = len(ground_truth["t"]) > 0
     return {
+        "kind": "homing",
         "topic": topic,
+        "start": start,
         "heading": heading,
         "status": status,
         "command": command,
@@ -376,11 +380,12 @@ def draw_errors(axes, run):
 
 
 def draw_command(axes, run):
+    """Returns the axes of turns; None without commands."""
     heading, command = run["heading"], run["command"]
     values = np.concatenate([command["ahead"], command["left"], command["turn"]])
     if not np.any(np.isfinite(values)):
         note(axes, "no cmd_vel_stamped during the run")
-        return
+        return None
     shade_states(axes, heading)
     turn_axes = axes.twinx()
     lines = [
@@ -395,24 +400,18 @@ def draw_command(axes, run):
     axes.legend(handles=lines, fontsize=8, ncol=3, loc="lower right")
     axes.set_ylabel("command [m/s]")
     colour_axis(turn_axes, "turn [deg/s]", "C3")
+    return turn_axes
 
 
-def draw_homing(run, name):
-    """The figure of a mobile base's run."""
-    heading, status = run["heading"], run["status"]
-    moments = choose_moments(run)
-    figure = plt.figure(figsize=(16, 10.5), constrained_layout=True)
-    top, bottom = figure.add_gridspec(2, 1, height_ratios=[3.1, 1.1])
-    left, right = top.subgridspec(1, 2)
-    panels = {name: figure.add_subplot(place)
-              for name, place in zip(("similarity", "errors", "command"), right.subgridspec(3, 1))}
-    draw_path(figure.add_subplot(left), run, moments)
+def draw_over_time(panels, run, moments):
+    """Similarity, errors and commands, in panels with these names. Returns what draw_command() does."""
+    heading = run["heading"]
     draw_similarity(panels["similarity"], run)
     draw_errors(panels["errors"], run)
-    draw_command(panels["command"], run)
+    turn_axes = draw_command(panels["command"], run)
     seen = sorted(set(heading["state"]))
     over_time = [panels[panel] for panel in ("similarity", "errors", "command") if panels[panel].axison]
-    end = max(duration(heading), duration(status), duration(run["command"]))
+    end = max(duration(heading), duration(run["status"]), duration(run["command"]))
     for axes in over_time:
         axes.set_xlim(0, max(end, 1e-3))
         axes.tick_params(labelbottom=axes is over_time[-1])
@@ -426,6 +425,20 @@ def draw_homing(run, name):
                                      for s in seen],
                             loc="lower left", bbox_to_anchor=(0.0, 1.0), ncol=len(seen), frameon=False, fontsize=9)
         over_time[-1].set_xlabel("time since the first heading [s]")
+    return turn_axes
+
+
+def draw_homing(run, name):
+    """The figure of a mobile base's run."""
+    heading, status = run["heading"], run["status"]
+    moments = choose_moments(run)
+    figure = plt.figure(figsize=(16, 10.5), constrained_layout=True)
+    top, bottom = figure.add_gridspec(2, 1, height_ratios=[3.1, 1.1])
+    left, right = top.subgridspec(1, 2)
+    panels = {name: figure.add_subplot(place)
+              for name, place in zip(("similarity", "errors", "command"), right.subgridspec(3, 1))}
+    draw_path(figure.add_subplot(left), run, moments)
+    draw_over_time(panels, run, moments)
     draw_histograms(figure, bottom, run, moments)
 
     title = f"{name}, {run['topic']}: {duration(heading):.1f} s"
@@ -452,6 +465,7 @@ def read_arm(bag):
         return math.hypot(v.x, v.y, v.z)
 
     run = {
+        "kind": "arm",
         "topic": topic,
         "error": read_table(bag, topic, {
             "point_x": lambda m: m.point_x, "point_y": lambda m: m.point_y,
@@ -472,6 +486,7 @@ def read_arm(bag):
     }
     start = run["error"]["t"][0]
     end = run["error"]["t"][-1] + AFTERMATH
+    run["start"] = start
     for name in ("error", "homography", "status", "truth"):
         run[name]["t"] = run[name]["t"] - start
         run[name] = select(run[name], (run[name]["t"] >= -AFTERMATH) & (run[name]["t"] <= end - start))
@@ -496,16 +511,12 @@ def draw_point_path(axes, error):
     axes.set_title("the chosen point in the image", fontsize=10)
 
 
-def draw_arm(run, name):
-    """The figure of an arm's run."""
-    error, status, homography, truth = run["error"], run["status"], run["homography"], run["truth"]
-    figure = plt.figure(figsize=(16, 9.5), constrained_layout=True)
-    left, right = figure.add_gridspec(1, 2)
-    places = [*left.subgridspec(2, 1, height_ratios=[3, 2]), *right.subgridspec(5, 1)]
-    panels = {name: figure.add_subplot(place)
-              for name, place in zip(("path", "distance", "point", "depth", "gains", "twist", "inliers"), places)}
-    draw_point_path(panels["path"], error)
+ARM_CURVES = ("point", "depth", "gains", "twist", "inliers")
 
+
+def draw_arm_curves(panels, run):
+    """Errors, gains and twist against time, in panels of the names ARM_CURVES. Returns the axes of turns of the twist."""
+    error, homography = run["error"], run["homography"]
     curves = {
         "point": ("point error [px]", [(error["point_x"] - error["wanted_x"], "x"),
                                        (error["point_y"] - error["wanted_y"], "y")]),
@@ -534,8 +545,15 @@ def draw_arm(run, name):
     panels["inliers"].set_ylabel("points", fontsize=9)
     panels["inliers"].grid(alpha=0.3)
     panels["inliers"].set_xlabel("time since the first error [s]")
+    for panel in ARM_CURVES:
+        panels[panel].set_xlim(0, max(duration(error), 1e-3))
+        panels[panel].tick_params(labelbottom=panel == "inliers")
+    return turn
 
-    axes = panels["distance"]
+
+def draw_arm_distance(axes, run):
+    """How far the camera is from the view, against time."""
+    error, truth = run["error"], run["truth"]
     axes.plot(error["t"], 1e3 * error["translation_error"], color="C0", label="distance from the view, estimated [mm]")
     axes.plot(error["t"], np.degrees(error["rotation_error"]), color="C3", label="rotation, estimated [deg]")
     if len(truth["t"]) > 1:
@@ -548,9 +566,19 @@ def draw_arm(run, name):
     axes.grid(which="both", alpha=0.2)
     axes.legend(fontsize=8)
     axes.set_xlabel("time since the first error [s]")
-    for panel in ("point", "depth", "gains", "twist", "inliers", "distance"):
-        panels[panel].set_xlim(0, max(duration(error), 1e-3))
-        panels[panel].tick_params(labelbottom=panel in ("inliers", "distance"))
+    axes.set_xlim(0, max(duration(error), 1e-3))
+
+
+def draw_arm(run, name):
+    """The figure of an arm's run."""
+    error, status = run["error"], run["status"]
+    figure = plt.figure(figsize=(16, 9.5), constrained_layout=True)
+    left, right = figure.add_gridspec(1, 2)
+    places = [*left.subgridspec(2, 1, height_ratios=[3, 2]), *right.subgridspec(5, 1)]
+    panels = {name: figure.add_subplot(place) for name, place in zip(("path", "distance", *ARM_CURVES), places)}
+    draw_point_path(panels["path"], error)
+    draw_arm_curves(panels, run)
+    draw_arm_distance(panels["distance"], run)
 
     title = f"{name}, {run['topic']}: {duration(error):.1f} s"
     if len(status["t"]):
