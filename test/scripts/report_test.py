@@ -224,7 +224,7 @@ class Report(unittest.TestCase):
         self.assertIn(EVIL, page.texts["parameters"])
         self.assertIn("0.1.0", page.texts["versions"])
         self.assertIn("12 of 16 matches of points agree", page.texts["pictures"])
-        self.assertIn("last image but those of 0.30 s, which have no matches, at 3.90 s", page.texts["pictures"])
+        self.assertIn("last image that has matches, 0.30 s before the last of all, at 3.90 s", page.texts["pictures"])
         circles = [attributes["class"] for tag, attributes in page.tags if tag == "circle"]
         self.assertEqual((circles.count("agrees"), circles.count("differs")), (24, 8))
         pictures = [attributes["href"] for tag, attributes in page.tags if tag == "image" and "jpeg" in attributes["href"]]
@@ -244,6 +244,17 @@ class Report(unittest.TestCase):
         self.assertIn(("div", {"class": "verdict bad", "id": "verdict"}), page.tags)
         self.assertEqual(page.rows(content, "statuses")[-1][2:4], ["aborted", EVIL])
         self.assertNotIn("<script", content)
+
+    def test_numbers_are_those_of_the_last_goal(self):
+        result = stamped(HomeToViewActionResult(), 8.0)
+        result.result.message, result.result.duration = "gave up", 2.5
+        _, content, page = self.page(homing_messages() + [("/status", status(7.0, ServoStatus.ACQUIRING, "looks"), 7.0),
+                                                          ("/home/result", result, 8.0)])
+        numbers = dict(page.rows(content, "numbers")[:-2])
+        self.assertEqual(numbers["left to go in the end, estimated"], "not known")
+        self.assertEqual(numbers["duration of the goal"], "2.5 s")
+        self.assertEqual(page.rows(content, "numbers")[-2:], [["4.10", "yes", "the views agree"], ["8.00", "no", "gave up"]])
+        self.assertEqual(page.texts["verdict"].strip(), "not arrived gave up")
 
     def test_what_a_bag_lacks_is_said_in_its_place(self):
         _, content, page = self.page([each for each in homing_messages() if each[0] == "/heading"])
