@@ -186,7 +186,7 @@ class Documented(unittest.TestCase):
                 words.pop(0)
             if words[0].endswith(".launch"):
                 words[:0] = ["roslaunch", PACKAGE]
-            elif words[0] in self.programs() | {"plot_run", "plot_experiment"} and len(words) > 1:
+            elif words[0] in self.programs() | {"plot_run", "plot_experiment", "report"} and len(words) > 1:
                 words[:0] = ["rosrun", PACKAGE]
             self.kind_of(words)(words)
 
@@ -324,7 +324,7 @@ class Documented(unittest.TestCase):
             return
         if program == "record_bag":
             arguments = arguments + ["--rate", "1"]
-        if program == "plot_run":
+        if program in ("plot_run", "report"):
             self.record_run(arguments[0])
         if program == "experiments" and arguments[0] != "--list":
             known = re.findall(r"^(\w+):", self.run_here("rosrun view_servo experiments --list"), re.MULTILINE)
@@ -433,7 +433,7 @@ class Documented(unittest.TestCase):
         text = re.sub(r"^[A-Z_]+=\S+ ", "", text)
         first = text.split(" ")[0]
         return text.startswith(self.COMMAND_STARTS) or " " in text and (
-            first in self.programs() | {"plot_run", "plot_experiment"} or first.startswith("bench_") or
+            first in self.programs() | {"plot_run", "plot_experiment", "report"} or first.startswith("bench_") or
             first.endswith(".launch"))
 
     def test_commands(self):
@@ -531,7 +531,8 @@ class Documented(unittest.TestCase):
         last_parts = {name.split("/")[-1] for name in known}
         sources = "".join(self.source_files().values())
         worlds = tuple(glob.glob(os.path.join(ROOT, "config", "worlds", "*.yaml")))
-        for path in worlds + ("CMakeLists.txt", "src/CMakeLists.txt", "test/CMakeLists.txt", "package.xml", "scripts/plot_run", "scripts/view",
+        for path in worlds + ("CMakeLists.txt", "src/CMakeLists.txt", "test/CMakeLists.txt", "package.xml", "scripts/plot_run", "scripts/record_run",
+                              "scripts/recorded_run.py", "scripts/report", "scripts/view",
                               "test/rostest/node_test.h"):
             sources += self.read(path)
         words = set(re.findall(r"\w+", sources.replace("${PROJECT_NAME}", PACKAGE)))
