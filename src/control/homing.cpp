@@ -630,7 +630,7 @@ private:
     }
     else if (report_.displacement <= 2.0 * params_.docking_displacement)
     {
-      setState(HomingState::NEAR, "the view's points are near their place");
+      setState(HomingState::NEAR, "the view's points are tracked, and come nearer to their place");
     }
     else
     {
