@@ -377,7 +377,9 @@ private:
   /** Whether the view's points are tracked, and their depths are known in metres. */
   bool isMetric() const
   {
-    return tracked_ && tracker_.depthsKnown() && scale_corrections_ >= ENOUGH_CORRECTIONS;
+    constexpr double MOST_DOUBT = 0.1;  // of the scale
+    return tracked_ && tracker_.depthsKnown() && scale_corrections_ >= ENOUGH_CORRECTIONS &&
+           scale_variance_ <= MOST_DOUBT * MOST_DOUBT;
   }
 
   /** A base that cannot slide stands to look: what is seen from one place is averaged. @param view in odometry's frame. */
@@ -402,9 +404,10 @@ private:
   /** The covariance of where the view is: that of its pose in the camera, and of the scale that odometry has given it. */
   Eigen::Matrix3d inOdometry(const ViewTracker::Result& result, double camera_yaw) const
   {
-    constexpr double SCALE_DOUBT = 0.05;  // wheels measure distances by some per cent wrong
+    constexpr double LEAST_DOUBT = 0.05;  // wheels measure distances by some per cent wrong
+    const double doubt = scale_ * std::max(LEAST_DOUBT, std::sqrt(scale_variance_));
     const Eigen::DiagonalMatrix<double, 3> metres(scale_, scale_, 1.0);
-    const Eigen::Vector3d along(SCALE_DOUBT * scale_ * result.pose.x, SCALE_DOUBT * scale_ * result.pose.y, 0.0);
+    const Eigen::Vector3d along(doubt * result.pose.x, doubt * result.pose.y, 0.0);
     const Eigen::Matrix3d turned = Eigen::AngleAxisd(camera_yaw, Eigen::Vector3d::UnitZ()).toRotationMatrix();
     return turned * (metres * result.covariance * metres + along * along.transpose()) * turned.transpose();
   }
@@ -441,6 +444,7 @@ private:
     tracker_ = std::move(fresh);
     scale_ = 1.0;
     scale_corrections_ = from_view ? ENOUGH_CORRECTIONS : 0;
+    scale_variance_ = 0.0;
     trail_.clear();
     contradictions_ = 0;
     return true;
@@ -528,6 +532,9 @@ private:
     if (by_odometry >= SHORTEST && by_view > 0.0)
     {
       const double measured = std::clamp(by_odometry / by_view, scale_ / MAX_CHANGE, scale_ * MAX_CHANGE);
+      const double change = std::log(measured / scale_);
+      const double weight = std::max(WEIGHT, 1.0 / (scale_corrections_ + 1));  // a plain mean of the first ones
+      scale_variance_ += weight * (change * change - scale_variance_);
       scale_ = std::clamp(scale_ * std::pow(measured / scale_, WEIGHT), 1.0 / MAX_SCALE, MAX_SCALE);
       ++scale_corrections_;
     }
@@ -663,6 +670,7 @@ private:
   std::optional<PlanarPose> view_in_odom_;                     // the view's level camera
   double scale_ = 1.0;                                         // metres in a unit of the tracker's
   int scale_corrections_ = 0;                                  // of it, by odometry
+  double scale_variance_ = 0.0;                                // of the parts by which the last ones changed it
   Eigen::Matrix3d view_covariance_ = Eigen::Matrix3d::Zero();  // of the view's place in odometry's frame [m, rad]
   std::deque<Place> trail_;                                    // of the camera, newest last
   bool tracked_ = false;                                       // in the last image

@@ -258,7 +258,8 @@ void ViewTracker::extend(const Correspondences& matches, const PlanarPose& pose)
 
 ViewTracker::Result ViewTracker::fit(const std::vector<Sighting>& sightings, double max_residual) const
 {
-  constexpr double LEAST_SD = 0.1;  // of where a point is found [px]
+  constexpr double LEAST_SD = 0.1;      // of where a point is found [px]
+  constexpr double INDEPENDENT = 25.0;  // points near each other err alike: no more than so many count
   const double focal = camera_.k(0, 0);
   Result result;
   result.looked_for = static_cast<int>(sightings.size());
@@ -296,7 +297,7 @@ ViewTracker::Result ViewTracker::fit(const std::vector<Sighting>& sightings, dou
     result.rms = std::sqrt(squares / result.supporting);
     result.displacement = medianOf(displacements);
     const double sd = std::max(result.rms, LEAST_SD);
-    result.covariance = sd * sd * information.inverse();
+    result.covariance = sd * sd * std::max(1.0, result.supporting / INDEPENDENT) * information.inverse();
   }
   result.found = result.supporting >= params_.min_supporting;
   return result;

@@ -88,6 +88,29 @@ TEST(HomingTrial, ArrivesInTheCorridorUnderAllHardConditions)
   expectArrival(trials.run(randomStart(world, rng)), 0.02, 1.0 * DEGREE);
 }
 
+TEST(HomingTrial, TellsNoDistanceInMetresBeforeItKnowsIt)
+{
+  // From here the first matches say little about depths: the distance in their unit is wrong by a half at first.
+  const World world = worldOf("corridor");
+  HomingTrialParams params;
+  params.seed = 3;
+  params.max_duration = 7.5;  // enough for it to be known
+  HomingTrials trials(world, params);
+  int told = 0;
+  trials.run({ 0.8882, 0.8769, -0.0797 }, [&](const HomingStep& step) {
+    if (step.report.goal_in_odom)
+    {
+      ++told;
+      const PlanarPose truth = compose(inverse(step.base), toPlanar(world.goal));
+      EXPECT_NEAR(step.report.distance, truth.distance(), 0.02 + 0.1 * truth.distance())
+          << "after " << step.time << " s";
+      EXPECT_LT(std::abs(step.report.distance - truth.distance()),
+                6.0 * std::sqrt(step.report.goal_covariance.topLeftCorner<2, 2>().trace()));
+    }
+  });
+  EXPECT_GT(told, 20);
+}
+
 TEST(HomingTrial, StandsStillWhenNothingOfTheViewIsInSight)
 {
   const World world = worldOf("desk");

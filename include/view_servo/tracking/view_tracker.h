@@ -108,8 +108,8 @@ public:
     bool found = false;  ///< whether enough landmarks support a pose
     PlanarPose pose;     ///< valid when found
     /**
-     * Of (x, y, yaw) of the pose, as the supporting landmarks' residuals let one expect it, with the structure taken for
-     * exact; NaN unless found [unit of the structure, rad].
+     * Of (x, y, yaw) of the pose, as the supporting landmarks' residuals let one expect it when no more than 25 of them err
+     * independently; the structure is taken for exact. NaN unless found [unit of the structure, rad].
      */
     Eigen::Matrix3d covariance = Eigen::Matrix3d::Constant(std::numeric_limits<double>::quiet_NaN());
     /** track(): landmarks predicted to be in the image, in about its scale; locate(): those matched. */
