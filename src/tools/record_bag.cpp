@@ -13,10 +13,12 @@
 #include "view_servo/parameters/error_text.h"
 #include "view_servo/ros/conversions.h"
 
+#include <sensor_msgs/CompressedImage.h>
 #include <sensor_msgs/image_encodings.h>
 #include <tf2_msgs/TFMessage.h>
 #include <Eigen/Geometry>
 #include <opencv2/core/utils/logger.hpp>
+#include <opencv2/imgcodecs.hpp>
 
 #include <cmath>
 #include <cstdint>
@@ -51,6 +53,7 @@ enum ExitStatus
 };
 
 constexpr char IMAGE_TOPIC[] = "/camera/image_raw";
+constexpr char COMPRESSED_TOPIC[] = "/camera/image_raw/compressed";
 constexpr char CAMERA_INFO_TOPIC[] = "/camera/camera_info";
 constexpr char GROUND_TRUTH_TOPIC[] = "/ground_truth";
 constexpr char ODOMETRY_TOPIC[] = "/odom";
@@ -82,6 +85,7 @@ struct Options
   std::optional<double> odometry_drift;
   std::optional<double> odometry_noise;
   std::optional<double> encoder_noise;
+  std::optional<int> jpeg;  // quality; else images are not compressed
 };
 
 tf2_msgs::TFMessage toTf(const geometry_msgs::TransformStamped& transform)
@@ -92,10 +96,22 @@ tf2_msgs::TFMessage toTf(const geometry_msgs::TransformStamped& transform)
 }
 
 /** An image and its calibration, both with the stamp of the calibration. */
-void writeImage(BagWriter& bag, const cv::Mat& image, const sensor_msgs::CameraInfo& info)
+void writeImage(BagWriter& bag, const cv::Mat& image, const sensor_msgs::CameraInfo& info, const Options& options)
 {
   bag.write(CAMERA_INFO_TOPIC, info.header.stamp, info);
-  bag.write(IMAGE_TOPIC, info.header.stamp, toImage(image, sensor_msgs::image_encodings::MONO8, info.header));
+  if (!options.jpeg)
+  {
+    bag.write(IMAGE_TOPIC, info.header.stamp, toImage(image, sensor_msgs::image_encodings::MONO8, info.header));
+    return;
+  }
+  sensor_msgs::CompressedImage message;
+  message.header = info.header;
+  message.format = std::string(sensor_msgs::image_encodings::MONO8) + "; jpeg compressed ";
+  if (!cv::imencode(".jpg", image, message.data, { cv::IMWRITE_JPEG_QUALITY, *options.jpeg }))
+  {
+    throw std::runtime_error("cannot compress an image as JPEG");
+  }
+  bag.write(COMPRESSED_TOPIC, info.header.stamp, message);
 }
 
 ros::Duration toDuration(double value)
@@ -283,7 +299,7 @@ void recordSimulation(const std::string& world_name, const std::string& trajecto
     if (image_due)
     {
       writeImage(bag, camera.capture(posesOfExposure(camera_before, camera_pose, world.quality.exposure)),
-                 sim::toCameraInfo(world, options.focal_length_error, stamp));
+                 sim::toCameraInfo(world, options.focal_length_error, stamp), options);
     }
     camera_before = camera_pose;
     robot->command(trackingTwist(robot->pose(), wanted_at(step), wanted_at(step + 1)));
@@ -388,7 +404,7 @@ void recordImages(const std::string& file, const Options& options)
     camera.height = image.rows;
     header.stamp = startOf(options) + toDuration(static_cast<double>(i) / options.rate);
     bag.write(GROUND_TRUTH_TOPIC, header.stamp, sim::toGroundTruth(images[i].pose, header.stamp));
-    writeImage(bag, image, view_servo::toCameraInfo(camera, header));
+    writeImage(bag, image, view_servo::toCameraInfo(camera, header), options);
   }
   bag.finish();
 }
@@ -401,6 +417,8 @@ void addOptions(CommandLine& line, Options& options)
   line.text("images", options.images, "Folder of recorded images with K.txt and poses.txt, instead of a world");
   line.number("rate", options.rate, rates, "Images a second");
   line.number("start-time", options.start_time, { 1.0, 4e9 }, "Of the bag [s]");
+  line.number("jpeg", options.jpeg, { 1.0, 100.0 },
+              "Quality of JPEG images, on image_raw/compressed; default: images as they are, on image_raw");
   line.number("odometry-rate", options.odometry_rate, rates, "Readings of odometry or encoders a second");
   line.number("seed", options.seed, {}, "Of all noise");
   line.list("groups", options.groups, "Surfaces to show besides those that always are: groups, joined by commas", ',');

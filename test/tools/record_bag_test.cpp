@@ -11,6 +11,7 @@
 #include <gtest/gtest.h>
 #include <rosbag/bag.h>
 #include <rosbag/view.h>
+#include <sensor_msgs/CompressedImage.h>
 #include <sensor_msgs/Image.h>
 #include <sensor_msgs/image_encodings.h>
 #include <tf2_msgs/TFMessage.h>
@@ -274,6 +275,25 @@ TEST_F(RecordBag, HasTheTopicsOfANomad)
     EXPECT_EQ(odometry.header.frame_id, "odom");
     EXPECT_EQ(odometry.child_frame_id, "base_link");
     EXPECT_EQ(truths.count(odometry.header.stamp), 1U);
+  }
+}
+
+TEST_F(RecordBag, CompressesImagesWhenAsked)
+{
+  const std::vector<Image> plain = messagesOf<Image>(record(nomad_, {}, "plain.bag"), IMAGES);
+  const std::string bag = record(nomad_, { "--jpeg", "90" });
+  EXPECT_EQ(topicsOf(bag).count(IMAGES), 0U);
+  const auto images = messagesOf<sensor_msgs::CompressedImage>(bag, IMAGES + std::string("/compressed"));
+  ASSERT_EQ(images.size(), plain.size());
+  for (std::size_t i = 0; i < images.size(); ++i)
+  {
+    EXPECT_EQ(images[i].header, plain[i].header);
+    EXPECT_EQ(images[i].format, "mono8; jpeg compressed ");
+    const cv::Mat image = cv::imdecode(images[i].data, cv::IMREAD_UNCHANGED);
+    const cv::Mat expected(cv::Size(160, 120), CV_8UC1, const_cast<unsigned char*>(plain[i].data.data()));
+    ASSERT_EQ(image.size(), expected.size());
+    ASSERT_EQ(image.type(), CV_8UC1);
+    EXPECT_LT(cv::norm(image, expected, cv::NORM_L1), 3.0 * 160 * 120);
   }
 }
 
