@@ -61,6 +61,15 @@ struct Task
   std::uint64_t number = 0;  // counts choices
 };
 
+/** The newest image, if the view was not tracked in it. */
+struct Unfound
+{
+  std_msgs::Header header;
+  cv::Mat image;  // grey, with distortion
+  std::optional<Eigen::Isometry3d> camera_in_odom;
+  bool searched = false;  // a search has begun in it
+};
+
 /** What diagnostics report. */
 struct Status
 {
@@ -85,7 +94,8 @@ std::string nameOf(TrackingState state)
  *  - `wanted_view` (view_servo/WantedView): the view that a driver wants followed; an empty one ends that.
  *
  * Publishes:
- *  - `~homography` (view_servo/Homography): for each image, with its header. Pixels are those of the images as they come, or,
+ *  - `~homography` (view_servo/Homography): for each image, with its header, and once more when a search finds the view in the
+ *    newest image, in which it was not tracked. Pixels are those of the images as they come, or,
  *    when camera_info has distortion, of rectified ones, with P's K. While images, calibration or tf are lacking, twice a
  *    second, stamped now, with the reason. What cannot be followed (no such view, damaged, of another size than the images,
  *    the camera is not calibrated, or not any more as when it began) is refused, likewise;
@@ -109,7 +119,7 @@ public:
     : NodeBase(nh, private_nh),
       params_(readTrackerParams(private_nh)),
       finder_(params_.matching),
-      searcher_(finder_, params_.match_period),
+      searcher_(finder_, params_.match_period, [this] { onAnswer(); }),
       camera_(nh, params_.camera, [this](const CameraFrame& frame) { onFrame(frame); }),
       starter_(params_.sessions, finder_.features(), camera_),
       transport_(private_nh)
@@ -208,12 +218,21 @@ private:
     wake_.notify_all();
   }
 
+  void onAnswer()
+  {
+    {
+      const std::lock_guard<std::mutex> lock(mutex_);
+      answered_ = true;
+    }
+    wake_.notify_all();
+  }
+
   void follow()
   {
     Task task;
     std::unique_lock<std::mutex> lock(mutex_);
     const auto due = [&] {
-      return stopping_ || task.number != task_number_ || (newest_ && !task.chosen.view.empty());
+      return stopping_ || task.number != task_number_ || ((newest_ || answered_) && !task.chosen.view.empty());
     };
     while (!stopping_)
     {
@@ -230,19 +249,22 @@ private:
         task = { choice_.chosen(), task_number_ };
         session_ = std::move(prepared_);
         last_frame_ = Clock::now();
+        unfound_.reset();
         ++era_;
       }
       const std::optional<CameraFrame> frame = std::exchange(newest_, std::nullopt);
+      const bool answered = std::exchange(answered_, false);
       lock.unlock();
       if (!task.chosen.view.empty() && !stopping_)
       {
-        guarded("following", [&] { step(task, frame); });
+        guarded("following", [&] { step(task, frame, answered); });
       }
       lock.lock();
     }
   }
 
-  void step(const Task& task, const std::optional<CameraFrame>& frame)
+  /** @param answered whether a search has finished since the last step. */
+  void step(const Task& task, const std::optional<CameraFrame>& frame, bool answered)
   {
     if (!session_)
     {
@@ -267,6 +289,14 @@ private:
       {
         publishHomography(task, PlaneTrack(), frame->image->header, fault, false);
       }
+    }
+    else if (answered)
+    {
+      guarded("the answer of a search", [&] { processAnswer(task); });
+    }
+    else if (unfound_ && !unfound_->searched && searcher_.ready())
+    {
+      search();
     }
     else if (const std::string fault = camera_.fault(); !fault.empty())
     {
@@ -306,17 +336,71 @@ private:
     }
     const std::optional<Eigen::Isometry3d> camera_in_odom =
         starter_.cameraInOdom(header, [this] { return stopping_.load(); });
-    const std::optional<PlaneSearcher::Search> search = searcher_.finished();
-    if (search && search->era == era_)
+    if (const std::optional<PlaneSearcher::Search> search = newSearch())
     {
-      session_->start(search->answer, search->camera_in_odom);
-      news = search->answer.h ? "the view cannot be tracked where it was found" : search->answer.reason;
+      news = startWhere(*search);
     }
     const PlaneTrack& track = session_->add(image, camera_in_odom);
-    if (track.state != TrackingState::TRACKING && searcher_.ready())
+    unfound_.reset();
+    if (track.state != TrackingState::TRACKING)
     {
-      searcher_.begin({ era_, session_->question(image), camera_in_odom, {} });
+      unfound_ = Unfound{ header, image, camera_in_odom };
+      if (searcher_.ready())
+      {
+        search();
+      }
     }
+    publish(task, track, header, news);
+    const std::lock_guard<std::mutex> lock(mutex_);
+    timings_.add(1e3 * std::chrono::duration<double>(Clock::now() - begin_time).count());
+  }
+
+  /**
+   * Looks where a search has found the view in the newest image, which has been looked at in vain: the next one may be far
+   * away, in time and in what it shows.
+   */
+  void processAnswer(const Task& task)
+  {
+    const std::optional<PlaneSearcher::Search> search = newSearch();
+    if (!search || !unfound_)
+    {
+      return;
+    }
+    const std::string news = startWhere(*search);
+    const PlaneTrack track = search->answer.h ? session_->add(unfound_->image, unfound_->camera_in_odom) : PlaneTrack();
+    publish(task, track, unfound_->header, news);
+    if (track.state == TrackingState::TRACKING)
+    {
+      unfound_.reset();
+    }
+  }
+
+  /** Begins to look for the view in the newest image. */
+  void search()
+  {
+    searcher_.begin({ era_, session_->question(unfound_->image), unfound_->camera_in_odom, {} });
+    unfound_->searched = true;
+  }
+
+  /** The search that has finished since the last call, if it is about this session. */
+  std::optional<PlaneSearcher::Search> newSearch()
+  {
+    std::optional<PlaneSearcher::Search> search = searcher_.finished();
+    return search && search->era == era_ ? std::move(search) : std::nullopt;
+  }
+
+  /** Starts the session where a search has found the view. @return the reason if it cannot be tracked then. */
+  std::string startWhere(const PlaneSearcher::Search& search)
+  {
+    session_->start(search.answer, search.camera_in_odom);
+    return search.answer.h ? "the view cannot be tracked where it was found" : search.answer.reason;
+  }
+
+  // ----------------------------------------------------------------------------------------------------- publishing
+
+  /** What came of an image. @param news as in updateStatus(). */
+  void publish(const Task& task, const PlaneTrack& track, const std_msgs::Header& header, const std::string& news)
+  {
     const std::string reason = updateStatus(task, track, news);
     publishHomography(task, track, header, reason, false);
     if (overlay_publisher_.getNumSubscribers() > 0)
@@ -328,11 +412,7 @@ private:
           task.chosen.view + ": " + nameOf(track.state) + (reason.empty() ? ", " + points : ": " + reason);
       overlay_publisher_.publish(toImage(session_->overlay(text), sensor_msgs::image_encodings::BGR8, header));
     }
-    const std::lock_guard<std::mutex> lock(mutex_);
-    timings_.add(1e3 * std::chrono::duration<double>(Clock::now() - begin_time).count());
   }
-
-  // ----------------------------------------------------------------------------------------------------- publishing
 
   /**
    * Updates what diagnostics report, and logs changes.
@@ -425,6 +505,7 @@ private:
   std::uint64_t task_number_ = 0;
   std::unique_ptr<PlaneSession> prepared_;  // of the choice, for the follower
   std::optional<CameraFrame> newest_;
+  bool answered_ = false;  // a search has finished
   Status status_;
   Timings timings_;  // of images
   std::atomic<bool> stopping_{ false };
@@ -434,6 +515,7 @@ private:
   std::unique_ptr<PlaneSession> session_;
   Clock::time_point last_frame_;  // or when the session began
   std::uint64_t era_ = 0;         // counts sessions, and times that time went back
+  std::optional<Unfound> unfound_;
   struct
   {
     std::uint64_t number = 0;

@@ -9,8 +9,10 @@
 
 namespace view_servo
 {
-PlaneSearcher::PlaneSearcher(const PlaneFinder& finder, double period)
-  : finder_(finder), period_(std::chrono::duration_cast<Clock::duration>(std::chrono::duration<double>(period)))
+PlaneSearcher::PlaneSearcher(const PlaneFinder& finder, double period, std::function<void()> on_finished)
+  : finder_(finder),
+    period_(std::chrono::duration_cast<Clock::duration>(std::chrono::duration<double>(period))),
+    on_finished_(std::move(on_finished))
 {
   worker_ = std::thread([this] { work(); });
 }
@@ -53,6 +55,7 @@ void PlaneSearcher::work()
       search->answer.reason = fault;
     }
     answers_.put(std::move(*search));
+    on_finished_();
   }
 }
 

@@ -10,6 +10,7 @@
 #include <atomic>
 #include <chrono>
 #include <cstdint>
+#include <functional>
 #include <optional>
 #include <thread>
 
@@ -30,8 +31,11 @@ public:
     PlaneFinder::Answer answer;                       ///< set when the search has ended
   };
 
-  /** @param period least time from the begin of one search to the next [s]. @param finder must outlive this. */
-  PlaneSearcher(const PlaneFinder& finder, double period);
+  /**
+   * @param period least time from the begin of one search to the next [s]. @param finder must outlive this.
+   * @param on_finished is called by another thread when finished() has an answer.
+   */
+  PlaneSearcher(const PlaneFinder& finder, double period, std::function<void()> on_finished);
   /** Waits until the running search has ended. */
   ~PlaneSearcher();
   PlaneSearcher(const PlaneSearcher&) = delete;
@@ -52,6 +56,7 @@ private:
 
   const PlaneFinder& finder_;
   const Clock::duration period_;
+  const std::function<void()> on_finished_;
   bool searching_ = false;
   Clock::time_point next_;
   std::atomic<bool> stopping_{ false };
