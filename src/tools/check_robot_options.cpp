@@ -79,7 +79,7 @@ void setArgument(Setup& setup, const std::string& name, const std::string& value
   const auto found = texts.find(name);
   if (found != texts.end())
   {
-    *found->second = value;
+    *found->second = name == "odom_frame" && value == "none" ? "" : value;  // as arm_servo.launch takes it
   }
   else if (name == "dry_run")
   {
