@@ -4,6 +4,7 @@
 
 #include "sim/textures.h"
 #include "view_servo/images/image_io.h"
+#include "view_servo/parameters/error_text.h"
 
 #include <yaml-cpp/yaml.h>
 #include <Eigen/Core>
@@ -310,7 +311,7 @@ private:
     }
     catch (const std::exception& error)
     {
-      fail(node, "texture '" + name + "': " + error.what());
+      fail(node, "texture '" + name + "': " + oneLine(error));
     }
     texture_of_[name] = static_cast<int>(world_.textures.size());
     world_.textures.push_back(picture);
@@ -514,7 +515,7 @@ World readWorld(const std::string& file)
   }
   catch (const std::exception& error)
   {
-    throw std::invalid_argument(file + ": " + error.what());
+    throw std::invalid_argument(file + ": " + oneLine(error));
   }
 }
 

@@ -3,6 +3,7 @@
 #include "view_servo/views/camera_file.h"
 
 #include "camera_yaml.h"
+#include "view_servo/parameters/error_text.h"
 
 #include <cstdint>
 #include <exception>
@@ -83,7 +84,7 @@ Camera readCameraFile(const std::string& path)
   }
   catch (const std::exception& error)
   {
-    throw std::runtime_error("no calibration can be read from '" + path + "': " + error.what());
+    throw std::runtime_error("no calibration can be read from '" + path + "': " + oneLine(error));
   }
 }
 

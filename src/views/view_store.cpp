@@ -5,6 +5,7 @@
 #include "camera_yaml.h"
 #include "view_servo/images/image_io.h"
 #include "view_servo/images/regular_file.h"
+#include "view_servo/parameters/error_text.h"
 
 #include <yaml-cpp/yaml.h>
 #include <opencv2/imgcodecs.hpp>
@@ -197,7 +198,7 @@ std::optional<std::string> readFile(const fs::path& path)
   }
   catch (const std::runtime_error& error)
   {
-    throw Damage(path.string() + ": " + error.what());
+    throw Damage(path.string() + ": " + oneLine(error));
   }
 }
 
@@ -248,7 +249,7 @@ std::string finishChange(const fs::path& directory, const std::string& name, con
   }
   catch (const std::exception& error)
   {
-    return std::string("its directory could not be put in order: ") + error.what();
+    return std::string("its directory could not be put in order: ") + oneLine(error);
   }
 }
 
@@ -482,7 +483,7 @@ std::vector<std::string> findNames(const fs::path& directory)
   }
   catch (const fs::filesystem_error& error)
   {
-    throw ViewStoreError(std::string("cannot list views: ") + error.what());
+    throw ViewStoreError(std::string("cannot list views: ") + oneLine(error));
   }
   std::sort(names.begin(), names.end());
   return names;
@@ -565,7 +566,7 @@ std::string ViewStore::save(const StoredView& view, bool overwrite) const
   }
   catch (const std::exception& error)
   {
-    fail("save", view.name, error.what());
+    fail("save", view.name, oneLine(error));
   }
 }
 
@@ -581,7 +582,7 @@ StoredView ViewStore::load(const std::string& name) const
   }
   catch (const std::exception& error)
   {
-    fail("load", name, error.what());
+    fail("load", name, oneLine(error));
   }
   fail("load", name, "there is none of that name");
 }
@@ -599,7 +600,7 @@ std::string ViewStore::revision(const std::string& name) const
   }
   catch (const std::exception& error)
   {
-    fail("load", name, error.what());
+    fail("load", name, oneLine(error));
   }
   fail("load", name, "there is none of that name");
 }
@@ -624,7 +625,7 @@ bool ViewStore::saveStructure(const std::string& name, const std::string& revisi
   }
   catch (const std::exception& error)
   {
-    fail("save the structure of", name, error.what());
+    fail("save the structure of", name, oneLine(error));
   }
   fail("save the structure of", name, "there is none of that name");
 }
@@ -639,7 +640,7 @@ ViewStructure ViewStore::loadStructure(const std::string& name) const
   }
   catch (const std::exception& error)
   {
-    fail("load the structure of", name, error.what());
+    fail("load the structure of", name, oneLine(error));
   }
 }
 
@@ -678,7 +679,7 @@ ViewStore::Listing ViewStore::list() const
     }
     catch (const std::exception& error)
     {
-      listing.damaged.push_back({ name, error.what() });
+      listing.damaged.push_back({ name, oneLine(error) });
     }
   }
   return listing;
@@ -701,7 +702,7 @@ std::string ViewStore::remove(const std::string& name) const
   }
   catch (const std::exception& error)
   {
-    fail("remove", name, error.what());
+    fail("remove", name, oneLine(error));
   }
   fail("remove", name, fs::exists(yaml) ? yaml.string() + " is not a file" : "there is none of that name");
 }
