@@ -88,10 +88,10 @@ double medianOfSome(std::vector<double> values)
 }
 
 /** Numbers as people read them. */
-std::string rounded(double value, const char* format = "%.1f")
+std::string rounded(double value, int decimals = 1)
 {
   char text[32];
-  std::snprintf(text, sizeof text, format, value);
+  std::snprintf(text, sizeof text, "%.*f", decimals, value);
   return text;
 }
 
@@ -130,7 +130,9 @@ void check(const HandEyeView& view, const std::vector<HandEyePose>& poses)
 class HandEye
 {
 public:
-  HandEye(const HandEyeView& view, const std::vector<HandEyePose>& poses) : view_(view)
+  /** @param distance of the plane from the view's camera [m]; NaN: not known. */
+  HandEye(const HandEyeView& view, const std::vector<HandEyePose>& poses, double distance)
+    : view_(view), known_distance_(distance)
   {
     const Eigen::Matrix3d inverse = view.k.inverse();
     for (const Eigen::Vector2d& corner : view.corners)
@@ -269,7 +271,15 @@ public:
       a.block<3, 1>(3 * row, 3) = -x * way;
       b.segment<3>(3 * row) = -motion.translation();
     }
-    const Eigen::Vector4d solution = a.colPivHouseholderQr().solve(b);
+    Eigen::Vector4d solution;
+    if (std::isnan(known_distance_))
+    {
+      solution = a.colPivHouseholderQr().solve(b);
+    }
+    else
+    {
+      solution << a.leftCols<3>().colPivHouseholderQr().solve(b - known_distance_ * a.col(3)), known_distance_;
+    }
     if (!solution.allFinite() || !(solution(3) > 0.0))
     {
       return false;
@@ -378,8 +388,21 @@ public:
     }
   }
 
+  /** Weight of distanceError(): with a known distance so large that it holds, else none. */
+  double distanceWeight() const
+  {
+    constexpr double EXACT = 1e10;  // one over the square of 1e-5, for one pixel of error in images
+    return std::isnan(known_distance_) ? 0.0 : EXACT;
+  }
+  /** Logarithm of the distance over the one that is known. */
+  double distanceError(const State& state) const
+  {
+    return std::isnan(known_distance_) ? 0.0 : std::log(state.distance / known_distance_);
+  }
+
 private:
   const HandEyeView& view_;
+  double known_distance_;
   std::vector<Eigen::Vector3d> rays_;  // of the view's corners, z = 1
   std::vector<Observation> observations_;
   std::vector<std::vector<EuclideanHomography>> decompositions_;
@@ -403,7 +426,7 @@ public:
 
   double cost(const State& state) const
   {
-    double sum = 0.0;
+    double sum = hand_eye_.distanceWeight() * hand_eye_.distanceError(state) * hand_eye_.distanceError(state);
     for (const std::size_t i : used_)
     {
       Errors errors;
@@ -420,6 +443,8 @@ public:
   {
     jtj.setZero();
     gradient.setZero();
+    jtj(14, 14) = hand_eye_.distanceWeight();
+    gradient(14) = hand_eye_.distanceWeight() * hand_eye_.distanceError(state);
     for (const std::size_t i : used_)
     {
       Errors errors;
@@ -488,7 +513,7 @@ ErrorModel errorModel(const HandEye& hand_eye, const State& state, const Indices
     hand_eye.errors(state, used[k], errors[k]);
     hand_eye.linearize(state, used[k], jacobians[k], by_arm[k]);
   }
-  const double freedom = static_cast<double>(ROWS * used.size()) - DOF;
+  const double freedom = static_cast<double>(ROWS * used.size()) - DOF + (hand_eye.distanceWeight() > 0.0 ? 1.0 : 0.0);
   ErrorModel best;
   double best_likelihood = -ENDLESS;
   for (int trial = 0; trial < TRIALS; ++trial)
@@ -496,6 +521,7 @@ ErrorModel errorModel(const HandEye& hand_eye, const State& state, const Indices
     ErrorModel model;
     model.ratio = LEAST * std::pow(STEP, trial);
     Normal normal = Normal::Zero();
+    normal(14, 14) = hand_eye.distanceWeight();
     Eigen::Matrix<double, DOF, 1> gradient = Eigen::Matrix<double, DOF, 1>::Zero();
     double squares = 0.0;
     double logarithms = 0.0;
@@ -790,6 +816,19 @@ std::vector<HandEyeResidual> residualsOf(const HandEye& hand_eye, const State& s
   return residuals;
 }
 
+/** What makes a result more certain. */
+std::string remedyFor(const HandEyeResult& result)
+{
+  constexpr double ALONG = 0.8;  // cosine of the angle to an axis
+  const Eigen::Vector3d weakest = singularValues(result.covariance.topLeftCorner<3, 3>()).u.col(0);
+  // Poses around one point, at one distance from it, do not tell the distance from how far back the camera is mounted.
+  return std::abs(weakest.dot(result.camera_in_flange.linear().col(2))) > ALONG
+             ? "most of it along the camera's axis: add poses nearer to the plane and farther away, and poses beside "
+               "each other "
+               "without a turn between them, or tell the distance of the plane"
+             : "add poses with larger turns about two axes";
+}
+
 }  // namespace
 
 double HandEyeResult::translationSigma() const
@@ -805,7 +844,7 @@ double HandEyeResult::rotationSigma() const
 HandEyeMotion handEyeMotion(const HandEyeView& view, const std::vector<HandEyePose>& poses)
 {
   check(view, poses);
-  return motionOf(HandEye(view, poses), poses);
+  return motionOf(HandEye(view, poses, NONE), poses);
 }
 
 std::vector<std::string> missingMotion(const HandEyeMotion& motion, const HandEyeParams& params)
@@ -820,21 +859,21 @@ std::vector<std::string> missingMotion(const HandEyeMotion& motion, const HandEy
   if (motion.rotation < params.min_rotation)
   {
     lines.push_back("the flange was turned by " + rounded(motion.rotation * DEGREES) + " degrees at most: turn it by " +
-                    rounded(params.min_rotation * DEGREES, "%.0f") + " or more, about the camera's axis, say");
+                    rounded(params.min_rotation * DEGREES, 0) + " or more, about the camera's axis, say");
   }
   else if (motion.second_rotation < params.min_second_rotation)
   {
     lines.push_back("the flange was turned about one axis only (" + rounded(motion.second_rotation * DEGREES) +
                     " degrees about others): turn it about another axis, too, by " +
-                    rounded(params.min_second_rotation * DEGREES, "%.0f") +
+                    rounded(params.min_second_rotation * DEGREES, 0) +
                     " degrees or more, so that the plane is seen from aside");
   }
   if (!(motion.travel >= params.min_travel))
   {
-    lines.push_back((std::isfinite(motion.travel) ? "the camera moved by " + rounded(100.0 * motion.travel, "%.0f") +
+    lines.push_back((std::isfinite(motion.travel) ? "the camera moved by " + rounded(100.0 * motion.travel, 0) +
                                                         " % of its distance from the plane"
                                                   : std::string("the images do not show that the camera moved")) +
-                    ": move it by " + rounded(100.0 * params.min_travel, "%.0f") + " % or more");
+                    ": move it by " + rounded(100.0 * params.min_travel, 0) + " % or more");
   }
   return lines;
 }
@@ -847,7 +886,11 @@ HandEyeResult calibrateHandEye(const HandEyeView& view, const std::vector<HandEy
   constexpr double CONSISTENT = 1.5;  // a normal distribution's standard deviation over its median error, about
   constexpr double LEAST = 0.1;       // errors that are none at the start [px]
   check(view, poses);
-  const HandEye hand_eye(view, poses);
+  if (!std::isnan(params.distance) && !(params.distance > 0.0 && std::isfinite(params.distance)))
+  {
+    throw std::invalid_argument("the distance of the plane has to be above 0");
+  }
+  const HandEye hand_eye(view, poses, params.distance);
   HandEyeResult result;
   result.residuals.resize(poses.size());
   result.motion = motionOf(hand_eye, poses);
@@ -904,7 +947,7 @@ HandEyeResult calibrateHandEye(const HandEyeView& view, const std::vector<HandEy
   result.image_error = std::sqrt(model.variance);
   result.rotation_error = model.ratio * result.image_error;
   result.translation_error = params.arm_lever * result.rotation_error;
-  result.motion = motionOf(HandEye(view, agreeing), agreeing, state.normal);
+  result.motion = motionOf(HandEye(view, agreeing, NONE), agreeing, state.normal);
   result.missing = missingMotion(result.motion, params);
   if (!result.missing.empty())
   {
@@ -915,8 +958,8 @@ HandEyeResult calibrateHandEye(const HandEyeView& view, const std::vector<HandEy
       !(result.rotationSigma() <= params.max_rotation_sigma))
   {
     result.missing.push_back("the result is uncertain by " + rounded(1e3 * result.translationSigma()) + " mm and " +
-                             rounded(DEGREES * result.rotationSigma(), "%.2f") +
-                             " degrees (standard deviation): add poses with larger turns about two axes");
+                             rounded(DEGREES * result.rotationSigma(), 2) + " degrees (standard deviation), " +
+                             remedyFor(result));
     result.message = result.missing.back();
     return result;
   }

@@ -42,6 +42,8 @@ struct HandEyeParams
   double min_travel = 0.15;              ///< of the camera between two poses, as a part of the plane's distance
   double max_translation_sigma = 0.005;  ///< of the result along its least certain direction [m]
   double max_rotation_sigma = 0.0175;    ///< likewise [rad]
+  /** Of the plane from the view's camera, along its normal, where somebody has measured it [m]; NaN: not known. */
+  double distance = std::numeric_limits<double>::quiet_NaN();
   double arm_lever = 0.5;  ///< how many metres the flange is off where it is one radian off; 0.5 suits arms of 1 m
 };
 
@@ -110,7 +112,7 @@ std::vector<std::string> missingMotion(const HandEyeMotion& motion, const HandEy
  * Does the same for poses in another order. Nothing is found when motion is lacking, when fewer than half of the poses agree, or
  * when the result is less certain than asked for.
  * @throws std::invalid_argument when the view has not four corners in general position, the camera matrix is none, a
- * number is not finite or a flange's rotation is none.
+ * number is not finite, a flange's rotation is none or a known distance is not above 0.
  */
 HandEyeResult calibrateHandEye(const HandEyeView& view, const std::vector<HandEyePose>& poses,
                                const HandEyeParams& params = {});
