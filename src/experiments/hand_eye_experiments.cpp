@@ -62,6 +62,17 @@ double degreesBetween(const Eigen::Isometry3d& a, const Eigen::Isometry3d& b)
   return DEGREES * rotationVector(a.linear().transpose() * b.linear()).norm();
 }
 
+/** Errors of place [mm] and direction [degrees] along the axes of the true camera, as numbers of a table. */
+std::string inFrame(const Eigen::Isometry3d& camera, const Eigen::Isometry3d& truth)
+{
+  const Eigen::Isometry3d off = truth.inverse() * camera;
+  const Eigen::IOFormat format(Eigen::StreamPrecision, Eigen::DontAlignCols, ",", ",");
+  std::ostringstream text;
+  text << Eigen::Vector3d(1e3 * off.translation()).transpose().format(format) << ','
+       << Eigen::Vector3d(DEGREES * rotationVector(off.linear())).transpose().format(format);
+  return text.str();
+}
+
 int usedOf(const HandEyeResult& result)
 {
   return static_cast<int>(std::count_if(result.residuals.begin(), result.residuals.end(),
@@ -86,6 +97,9 @@ public:
       puma_(urdf, pumaParams(seed)),
       finder_(PointViewMatcherParams())
   {
+    // What is beside the plane must not touch the corners' surroundings.
+    world_.region = cv::Rect(world_.region.x + MARGIN, world_.region.y + MARGIN, world_.region.width - 2 * MARGIN,
+                             world_.region.height - 2 * MARGIN);
     const Eigen::Isometry3d mounted(Eigen::Translation3d(0.03, -0.05, 0.07) *
                                     Eigen::AngleAxisd(1.2, Eigen::Vector3d(1.0, 2.0, -1.0).normalized()));
     described_camera_in_flange_ = mounted;
@@ -128,6 +142,7 @@ public:
 
 private:
   static constexpr double IMAGE_NOISE = 2.0;
+  static constexpr int MARGIN = 16;  // of the region from that of the world [px]
 
   static sim::PumaParams pumaParams(std::uint64_t seed)
   {
@@ -390,7 +405,8 @@ void runHandEyeExperiment(const ExperimentContext& context, std::ostream& csv)
     line << world << ',' << i % runs << ',' << (result.found ? 1 : 0) << ',' << result.residuals.size() << ','
          << usedOf(result) << ',' << millimetres << ',' << degrees << ',' << 1e3 * result.translationSigma() << ','
          << DEGREES * result.rotationSigma() << ',' << result.image_error << ',' << 1e3 * result.translation_error
-         << ',' << DEGREES * result.rotation_error << '\n';
+         << ',' << DEGREES * result.rotation_error << ',' << inFrame(result.camera_in_flange, calibration.truth())
+         << '\n';
     const std::lock_guard<std::mutex> lock(mutex);
     lines[i] = line.str();
     std::cerr << line.str() << (result.message.empty() ? "" : result.message + "\n") << std::flush;
@@ -406,7 +422,7 @@ void runHandEyeExperiment(const ExperimentContext& context, std::ostream& csv)
     }
   });
   csv << "world,index,found,poses,used,translation_error_mm,rotation_error_deg,translation_sigma_mm,rotation_sigma_deg,"
-         "image_error_px,arm_translation_error_mm,arm_rotation_error_deg\n";
+         "image_error_px,arm_translation_error_mm,arm_rotation_error_deg,x_mm,y_mm,z_mm,x_deg,y_deg,z_deg\n";
   for (const std::string& line : lines)
   {
     csv << line;
