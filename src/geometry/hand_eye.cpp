@@ -10,7 +10,6 @@
 
 #include <Eigen/Cholesky>
 #include <Eigen/LU>
-#include <Eigen/QR>
 #include <opencv2/calib3d.hpp>
 #include <opencv2/core.hpp>
 #include <opencv2/core/eigen.hpp>
@@ -35,9 +34,10 @@ constexpr int DOF = 15;            // camera on flange, view in base, direction 
 constexpr int LEAST_POSES = 6;
 
 using Errors = Eigen::Matrix<double, ROWS, 1>;
-using Square = Eigen::Matrix<double, ROWS, ROWS>;
-using Jacobian = Eigen::Matrix<double, ROWS, DOF>;
-using ArmJacobian = Eigen::Matrix<double, ROWS, 6>;
+// Of sizes that the compiler does not know, which spares it a minute: ROWS x ROWS, ROWS x DOF, ROWS x 6.
+using Square = Eigen::MatrixXd;
+using Jacobian = Eigen::MatrixXd;
+using ArmJacobian = Eigen::MatrixXd;
 using Normal = Eigen::Matrix<double, DOF, DOF>;
 using Indices = std::vector<std::size_t>;
 
@@ -274,11 +274,15 @@ public:
     Eigen::Vector4d solution;
     if (std::isnan(known_distance_))
     {
-      solution = a.colPivHouseholderQr().solve(b);
+      solution = solveSymmetric(Eigen::Matrix4d(a.transpose() * a), Eigen::Vector4d(a.transpose() * b));
     }
     else
     {
-      solution << a.leftCols<3>().colPivHouseholderQr().solve(b - known_distance_ * a.col(3)), known_distance_;
+      const Eigen::Matrix<double, 9, 3> rotated = a.leftCols<3>();
+      const Eigen::Matrix<double, 9, 1> rest = b - known_distance_ * a.col(3);
+      solution << solveSymmetric(Eigen::Matrix3d(rotated.transpose() * rotated),
+                                 Eigen::Vector3d(rotated.transpose() * rest)),
+          known_distance_;
     }
     if (!solution.allFinite() || !(solution(3) > 0.0))
     {
@@ -448,8 +452,8 @@ public:
     for (const std::size_t i : used_)
     {
       Errors errors;
-      Jacobian jacobian;
-      ArmJacobian by_arm;
+      Jacobian jacobian(ROWS, DOF);
+      ArmJacobian by_arm(ROWS, 6);
       hand_eye_.errors(state, i, errors);
       hand_eye_.linearize(state, i, jacobian, by_arm);
       jacobian = whitening_[i] * jacobian;
@@ -490,13 +494,13 @@ Square covarianceOf(const ArmJacobian& by_arm, double ratio, double lever)
   Eigen::Matrix<double, 6, 1> scale;
   scale << Eigen::Vector3d::Constant(ratio * lever), Eigen::Vector3d::Constant(ratio);
   const ArmJacobian scaled = by_arm * scale.asDiagonal();
-  return Square::Identity() + scaled * scaled.transpose();
+  return Square::Identity(ROWS, ROWS) + scaled * scaled.transpose();
 }
 
 Square whiteningOf(const Square& covariance)
 {
   const Eigen::LLT<Square> cholesky(covariance);
-  return cholesky.matrixL().solve(Square::Identity());
+  return cholesky.matrixL().solve(Square::Identity(ROWS, ROWS));
 }
 
 /** The ratio of errors with the largest restricted likelihood (Patterson & Thompson 1971), tried out. */
@@ -506,8 +510,8 @@ ErrorModel errorModel(const HandEye& hand_eye, const State& state, const Indices
   constexpr double LEAST = 1e-6;  // [rad/px]
   constexpr double STEP = 1.4;
   std::vector<Errors> errors(used.size());
-  std::vector<Jacobian> jacobians(used.size());
-  std::vector<ArmJacobian> by_arm(used.size());
+  std::vector<Jacobian> jacobians(used.size(), Jacobian(ROWS, DOF));
+  std::vector<ArmJacobian> by_arm(used.size(), ArmJacobian(ROWS, 6));
   for (std::size_t k = 0; k < used.size(); ++k)
   {
     hand_eye.errors(state, used[k], errors[k]);
@@ -555,8 +559,8 @@ std::vector<Square> whiteningOf(const HandEye& hand_eye, const State& state, dou
   std::vector<Square> result;
   for (std::size_t i = 0; i < hand_eye.size(); ++i)
   {
-    Jacobian by_state;
-    ArmJacobian by_arm;
+    Jacobian by_state(ROWS, DOF);
+    ArmJacobian by_arm(ROWS, 6);
     hand_eye.linearize(state, i, by_state, by_arm);
     result.push_back(whiteningOf(covarianceOf(by_arm, ratio, lever)));
   }
@@ -579,15 +583,16 @@ std::vector<double> disagreements(const HandEye& hand_eye, const State& state, c
       result.push_back(ENDLESS);
       continue;
     }
-    Jacobian jacobian;
-    ArmJacobian by_arm;
+    Jacobian jacobian(ROWS, DOF);
+    ArmJacobian by_arm(ROWS, 6);
     hand_eye.linearize(state, i, jacobian, by_arm);
     const Square whitening = whiteningOf(covarianceOf(by_arm, model.ratio, lever));
     jacobian = whitening * jacobian;
     errors = whitening * errors;
     const bool is_used = std::find(used.begin(), used.end(), i) != used.end();
     const Square leverage = jacobian * model.inverse * jacobian.transpose();
-    const Square covariance = is_used ? Square(Square::Identity() - leverage) : Square(Square::Identity() + leverage);
+    const Square covariance =
+        is_used ? Square(Square::Identity(ROWS, ROWS) - leverage) : Square(Square::Identity(ROWS, ROWS) + leverage);
     result.push_back(std::max(0.0, errors.dot(covariance.ldlt().solve(errors))));
   }
   return result;
@@ -638,7 +643,7 @@ bool robustStart(const HandEye& hand_eye, std::size_t count, State& start)
   };
   const std::size_t n = hand_eye.size();
   const std::size_t stride = n * (n - 1) * (n - 2) / 6 / MOST_TRIPLES + 1;
-  const std::vector<Square> plain(n, Square::Identity());
+  const std::vector<Square> plain(n, Square::Identity(ROWS, ROWS));
   double best_cost = ENDLESS;
   for (const Eigen::Vector3d& normal : hand_eye.normals())
   {
