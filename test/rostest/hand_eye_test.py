@@ -176,8 +176,8 @@ class HandEye(graph.GraphTest):
         publisher = rospy.Publisher("/tf_static", TFMessage, queue_size=1, latch=True)
         publisher.publish(TFMessage([below]))
         graph.wait_until("the camera's frames", lambda: "other_optical_frame" in self.static)
-        launch = self.graph.start("roslaunch", "view_servo", "arm_servo.launch", "sim:=false", "matching:=false",
-                                  "dry_run:=true", "hand_eye:=other.yaml")
+        launch = self.graph.start("env", "ROS_NAMESPACE=second", "roslaunch", "view_servo", "arm_servo.launch", "sim:=false",
+                                  "matching:=false", "dry_run:=true", "hand_eye:=other.yaml")
         placed = graph.wait_until("the camera on the flange", lambda: self.static.get("other_link"))
         launch.send_signal(signal.SIGINT)
         self.assertEqual(placed.header.frame_id, "flange")
@@ -199,11 +199,13 @@ class HandEye(graph.GraphTest):
     def test_refuses_too_little_motion(self):
         self.hold(POSES[0])
         process = self.begin("--view box --flange flange --out little.yaml")
+        text = ""
         for line in process.stdout:
+            text += line
             if line.startswith("pose 1 of 12 taken"):
                 break
         process.send_signal(signal.SIGINT)
-        text = process.stdout.read()
+        text += process.stdout.read()
         process.wait(20.0)
         self.assertEqual(process.returncode, NOT_DONE, text)
         self.assertIn("not calibrated: too little motion: there are 1 different poses: 8 are needed", text)
