@@ -2,30 +2,20 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "experiments/arm_geometry_experiment.h"
 
-#include "experiments/input_file.h"
-#include "view_servo/geometry/camera.h"
+#include "experiments/arm_data.h"
 #include "view_servo/geometry/correspondence.h"
 #include "view_servo/geometry/euclidean_homography.h"
 #include "view_servo/geometry/homography.h"
 #include "view_servo/geometry/rotation_vector.h"
 
-#include <yaml-cpp/yaml.h>
 #include <Eigen/Geometry>
 #include <Eigen/LU>
-#include <opencv2/calib3d.hpp>
-#include <opencv2/core.hpp>
-#include <opencv2/core/eigen.hpp>
 
 #include <algorithm>
 #include <cmath>
-#include <filesystem>
-#include <fstream>
 #include <iomanip>
 #include <iostream>
-#include <iterator>
 #include <limits>
-#include <sstream>
-#include <stdexcept>
 #include <string>
 #include <vector>
 
@@ -33,163 +23,9 @@ namespace view_servo
 {
 namespace
 {
-namespace fs = std::filesystem;
-
 constexpr double DEGREES = 180.0 / M_PI;
-constexpr int ROWS = 6;  // of the board's corners, which are in the order of rows
-constexpr int COLUMNS = 9;
-constexpr std::size_t CORNERS = ROWS * COLUMNS;
-constexpr std::size_t MIDDLE = 2 * COLUMNS + 4;
+constexpr std::size_t MIDDLE = 2 * ArmData::COLUMNS + 4;  // of the board's corners
 constexpr double NONE = std::numeric_limits<double>::quiet_NaN();
-
-/** An image of the board and where the arm held the camera. */
-struct ArmView
-{
-  Eigen::Isometry3d camera_in_base;
-  Points corners;  ///< of the board [px], in the order of its squares
-};
-
-/** What eyeinhand_franka_visp holds. */
-struct ArmData
-{
-  Camera camera;
-  std::vector<ArmView> views;
-};
-
-/** Of ViSP's XML; the camera has no distortion. */
-Camera readCamera(const fs::path& file)
-{
-  std::ifstream stream = openForReading(file);
-  const std::string text{ std::istreambuf_iterator<char>(stream), std::istreambuf_iterator<char>() };
-  const auto value = [&](const std::string& tag) {
-    const std::size_t at = text.find("<" + tag + ">");
-    if (at == std::string::npos)
-    {
-      throw std::runtime_error(file.string() + " has no <" + tag + ">");
-    }
-    return std::stod(text.substr(at + tag.size() + 2));
-  };
-  Camera camera;
-  camera.width = static_cast<int>(value("image_width"));
-  camera.height = static_cast<int>(value("image_height"));
-  camera.k << value("px"), 0.0, value("u0"), 0.0, value("py"), value("v0"), 0.0, 0.0, 1.0;
-  return camera;
-}
-
-/** Position [m] and rotation vector [rad], as ViSP writes them. */
-Eigen::Isometry3d readPose(const fs::path& file)
-{
-  Eigen::Matrix<double, 6, 1> values;
-  try
-  {
-    const YAML::Node data = YAML::LoadFile(file.string())["data"];
-    for (int i = 0; i < 6; ++i)
-    {
-      values(i) = data[i][0].as<double>();
-    }
-  }
-  catch (const YAML::Exception& error)
-  {
-    throw std::runtime_error("cannot read " + file.string() + ": " + error.what());
-  }
-  Eigen::Isometry3d pose = Eigen::Isometry3d::Identity();
-  pose.translation() = values.head<3>();
-  pose.linear() = rotationFromVector(values.tail<3>());
-  return pose;
-}
-
-ArmData readArmData(const fs::path& folder)
-{
-  ArmData data;
-  data.camera = readCamera(folder / "franka_camera.xml");
-  Eigen::Isometry3d camera_in_hand;
-  std::ifstream hand = openForReading(folder / "derived_eMc_park.txt");
-  for (int i = 0; i < 16; ++i)
-  {
-    hand >> camera_in_hand.matrix()(i / 4, i % 4);
-  }
-  if (!hand)
-  {
-    throw std::runtime_error("no pose in " + (folder / "derived_eMc_park.txt").string());
-  }
-  // Images count from 1, corners from 0, in order.
-  std::ifstream corners = openForReading(folder / "derived_chessboard_corners.txt");
-  for (std::string line; std::getline(corners, line);)
-  {
-    std::istringstream words(line);
-    std::size_t image = 0;
-    std::size_t corner = 0;
-    Eigen::Vector2d position;
-    if (words >> image >> corner >> position.x() >> position.y())
-    {
-      if (image > data.views.size())
-      {
-        const std::string name = "franka_pose_rPe_" + std::to_string(data.views.size() + 1) + ".yaml";
-        data.views.push_back({ readPose(folder / name) * camera_in_hand, {} });
-      }
-      if (image != data.views.size() || corner != data.views.back().corners.size())
-      {
-        throw std::runtime_error("corners are not in order: " + line);
-      }
-      data.views.back().corners.push_back(position);
-    }
-  }
-  const auto differs = [](const ArmView& view) {
-    return view.corners.size() != CORNERS;
-  };
-  if (data.views.size() < 2 || std::any_of(data.views.begin(), data.views.end(), differs))
-  {
-    throw std::runtime_error("images are missing, or corners of them: " + folder.string());
-  }
-  return data;
-}
-
-/**
- * The corners without the distortion that the file of the camera leaves out: radial, from the squares of the board
- * alone.
- * @return the root mean square distance of the corners from where the board is seen then [px].
- */
-double removeDistortion(ArmData& data)
-{
-  std::vector<cv::Point3f> board;
-  for (int row = 0; row < ROWS; ++row)
-  {
-    for (int column = 0; column < COLUMNS; ++column)
-    {
-      board.emplace_back(static_cast<float>(column), static_cast<float>(row), 0.0F);
-    }
-  }
-  std::vector<std::vector<cv::Point2f>> corners;
-  for (const ArmView& view : data.views)
-  {
-    corners.emplace_back();
-    for (const Eigen::Vector2d& corner : view.corners)
-    {
-      corners.back().emplace_back(static_cast<float>(corner.x()), static_cast<float>(corner.y()));
-    }
-  }
-  cv::Mat k;
-  cv::eigen2cv(data.camera.k, k);
-  cv::Mat distortion = cv::Mat::zeros(5, 1, CV_64F);
-  std::vector<cv::Mat> rotations;
-  std::vector<cv::Mat> translations;
-  const double rms =
-      cv::calibrateCamera(std::vector<std::vector<cv::Point3f>>(corners.size(), board), corners,
-                          cv::Size(data.camera.width, data.camera.height), k, distortion, rotations, translations,
-                          cv::CALIB_USE_INTRINSIC_GUESS | cv::CALIB_FIX_FOCAL_LENGTH | cv::CALIB_FIX_PRINCIPAL_POINT |
-                              cv::CALIB_ZERO_TANGENT_DIST | cv::CALIB_FIX_K3);
-  Camera distorted = data.camera;
-  distorted.distortion_model = "plumb_bob";
-  distorted.distortion.assign(distortion.begin<double>(), distortion.end<double>());
-  for (ArmView& view : data.views)
-  {
-    for (Eigen::Vector2d& corner : view.corners)
-    {
-      corner = (data.camera.k * distorted.normalized(corner).homogeneous()).hnormalized();
-    }
-  }
-  return rms;
-}
 
 double degreesBetween(const Eigen::Vector3d& a, const Eigen::Vector3d& b)
 {

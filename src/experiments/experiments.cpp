@@ -12,6 +12,7 @@
 #include "experiments/cyclic_order_experiment.h"
 #include "experiments/experiment_context.h"
 #include "experiments/false_answers_experiment.h"
+#include "experiments/hand_eye_experiments.h"
 #include "experiments/homing_experiments.h"
 #include "experiments/hypothesis_experiments.h"
 #include "experiments/line_ground_truth.h"
@@ -86,6 +87,10 @@ const std::vector<Experiment>& experiments()
       runRecognitionExperiment },
     { "arm_geometry", "chapter 8: motions from homographies beside a real arm's", true, std::nullopt,
       runArmGeometryExperiment },
+    { "hand_eye", "hand-eye calibration of a simulated arm by a stored view", false, HAND_EYE_RUNS,
+      runHandEyeExperiment },
+    { "hand_eye_real", "the same of a real arm, beside a calibration with a board of known size", true, std::nullopt,
+      runHandEyeRealExperiment },
     { "cyclic_order", "figures 7.5 to 7.11: cyclic order against plain votes", false, DRAWN_PICTURES,
       runCyclicOrderExperiment },
   };

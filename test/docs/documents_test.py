@@ -53,6 +53,7 @@ NOT_RUN = {
 # Names that no node and no source explains, and what they are.
 KNOWN_NAMES = {
     "x_cur ~ H x_ref": "a formula",
+    "tf2_msgs/TFMessage": "a type, the Python side of which need not be installed",
     "src": "of a catkin workspace",
     "$ROS_HOME/view_servo/views": "a directory of the user's",
     "NAME.yaml": "a file of the user's",
@@ -107,6 +108,12 @@ class Documented(unittest.TestCase):
         # The drivers' launch files leave it out.
         cls.graphs[0].start("rosrun", PACKAGE, "scene_matcher", "image_raw:=camera/image_raw", "camera_info:=camera/camera_info",
                             "wanted_view:=homing/wanted_view")
+        hand_eye = os.path.join(cls.directory, "mounted.yaml")
+        with open(hand_eye, "w") as file:
+            yaml.safe_dump({"parameters": {"eye_on_hand": True, "robot_base_frame": "other_base", "robot_effector_frame": "other_flange",
+                                           "tracking_base_frame": "other_camera"},
+                            "transformation": {"x": 0.0, "y": 0.0, "z": 0.1, "qx": 0.0, "qy": 0.0, "qz": 0.0, "qw": 1.0}}, file)
+        cls.graphs[0].start("rosrun", PACKAGE, "publish_hand_eye", "_file:=" + hand_eye, "_patience:=0")
         cls.graphs[0].start("rosrun", PACKAGE, "view_recognizer", "image_raw:=camera/image_raw", "camera_info:=camera/camera_info")
         for running, (_, services) in zip(cls.graphs, wanted):
             try:

@@ -112,6 +112,10 @@ NOT_FOR_USERS = {
     ],
     "it is a program's help, or says what to do next": [
         r"Listens to .*",
+        r"view ' ... ': bring the arm to .*",
+        r"move the arm to another pose, .*",
+        r"that is enough",
+        r"errors: images  .*",
         r"Print this, and end",
         r"Exit status: .*",
         r"match_images (points|lines|scene) REF .*",

@@ -1,0 +1,33 @@
+// Copyright (c) 2026, the view_servo authors
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <Eigen/Geometry>
+
+#include <string>
+#include <vector>
+
+namespace view_servo
+{
+/** A hand-eye calibration with the names of its frames, as a file holds it. */
+struct HandEyeFile
+{
+  std::string base_frame;                                              ///< of the arm
+  std::string flange_frame;                                            ///< that the camera is mounted on
+  std::string camera_frame;                                            ///< the camera's optical frame
+  Eigen::Isometry3d camera_in_flange = Eigen::Isometry3d::Identity();  ///< [m]
+  std::vector<double> covariance;  ///< row-major 6x6, as HandEyeResult has it [m, rad]; may be empty
+  std::string comment;             ///< one line; is written, not read
+};
+
+/**
+ * Reads a file as this package or easy_handeye writes it: `parameters` with eye_on_hand, robot_base_frame,
+ * robot_effector_frame and tracking_base_frame, and `transformation` with x, y, z, qx, qy, qz, qw.
+ * @throws std::runtime_error naming the file and what is wrong with it; also when the camera is not on the hand.
+ */
+HandEyeFile readHandEyeFile(const std::string& path);
+
+/** Writes such a file in one step. @throws std::runtime_error naming the file when it cannot be written. */
+void writeHandEyeFile(const HandEyeFile& hand_eye, const std::string& path);
+
+}  // namespace view_servo

@@ -1,0 +1,454 @@
+// Copyright (c) 2026, the view_servo authors
+// SPDX-License-Identifier: BSD-3-Clause
+#include "experiments/hand_eye_experiments.h"
+
+#include "experiments/arm_data.h"
+#include "experiments/input_file.h"
+#include "experiments/parallel.h"
+#include "experiments/statistics.h"
+#include "sim/puma.h"
+#include "sim/renderer.h"
+#include "sim/visibility.h"
+#include "sim/world_reader.h"
+#include "tools/package_folder.h"
+#include "view_servo/control/still_pose.h"
+#include "view_servo/geometry/hand_eye.h"
+#include "view_servo/geometry/homography.h"
+#include "view_servo/geometry/region.h"
+#include "view_servo/geometry/rotation_vector.h"
+#include "view_servo/robust/random.h"
+#include "view_servo/tracking/plane_finder.h"
+#include "view_servo/tracking/plane_tracker.h"
+#include "view_servo/views/prepared_image.h"
+
+#include <Eigen/Geometry>
+#include <opencv2/calib3d.hpp>
+#include <opencv2/core.hpp>
+#include <opencv2/core/eigen.hpp>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstdint>
+#include <cstdio>
+#include <fstream>
+#include <iostream>
+#include <iterator>
+#include <limits>
+#include <map>
+#include <memory>
+#include <mutex>
+#include <optional>
+#include <sstream>
+#include <stdexcept>
+#include <string>
+#include <vector>
+
+namespace view_servo
+{
+namespace
+{
+constexpr double DEGREES = 180.0 / M_PI;
+constexpr std::array<const char*, 2> WORLDS = { "rice", "mouse" };
+constexpr int POSES = 12;
+
+double millimetresBetween(const Eigen::Isometry3d& a, const Eigen::Isometry3d& b)
+{
+  return 1e3 * (a.translation() - b.translation()).norm();
+}
+
+double degreesBetween(const Eigen::Isometry3d& a, const Eigen::Isometry3d& b)
+{
+  return DEGREES * rotationVector(a.linear().transpose() * b.linear()).norm();
+}
+
+/** Errors of place [mm] and direction [degrees] along the axes of the true camera, as numbers of a table. */
+std::string inFrame(const Eigen::Isometry3d& camera, const Eigen::Isometry3d& truth)
+{
+  const Eigen::Isometry3d off = truth.inverse() * camera;
+  const Eigen::IOFormat format(Eigen::StreamPrecision, Eigen::DontAlignCols, ",", ",");
+  std::ostringstream text;
+  text << Eigen::Vector3d(1e3 * off.translation()).transpose().format(format) << ','
+       << Eigen::Vector3d(DEGREES * rotationVector(off.linear())).transpose().format(format);
+  return text.str();
+}
+
+int usedOf(const HandEyeResult& result)
+{
+  return static_cast<int>(std::count_if(result.residuals.begin(), result.residuals.end(),
+                                        [](const HandEyeResidual& residual) { return residual.used; }));
+}
+
+double largest(const std::vector<double>& values)
+{
+  return *std::max_element(values.begin(), values.end());
+}
+
+// --------------------------------------------------------------------------------------------------- simulated arm
+
+/** One calibration of the simulated arm. */
+class Calibration
+{
+public:
+  Calibration(const sim::World& world, const std::string& urdf, std::uint64_t seed)
+    : world_(sim::withImageNoise(world, IMAGE_NOISE)),
+      rng_(seed),
+      camera_(world_, {}, seed),
+      puma_(urdf, pumaParams(seed)),
+      finder_(PointViewMatcherParams())
+  {
+    // What is beside the plane must not touch the corners' surroundings.
+    world_.region = cv::Rect(world_.region.x + MARGIN, world_.region.y + MARGIN, world_.region.width - 2 * MARGIN,
+                             world_.region.height - 2 * MARGIN);
+    const Eigen::Isometry3d mounted(Eigen::Translation3d(0.03, -0.05, 0.07) *
+                                    Eigen::AngleAxisd(1.2, Eigen::Vector3d(1.0, 2.0, -1.0).normalized()));
+    described_camera_in_flange_ = mounted;
+    hold(world_.goal);
+    view_ = std::make_shared<const PreparedImage>(camera_.capture(world_.robot_base * puma_.cameraPose()),
+                                                  world_.region, finder_.features());
+    // The true camera is where the description has it, and then the hand-eye error further.
+    camera_in_flange_ = mounted * puma_.nominalCameraPose(puma_.joints()).inverse() * puma_.cameraPose();
+    const Eigen::Vector3d ray = (world_.camera.k.inverse() * middleOf(world_.region).homogeneous()).normalized();
+    const std::optional<double> distance = sim::firstHit(world_, world_.goal.translation(), world_.goal.linear() * ray);
+    if (!distance)
+    {
+      throw std::runtime_error("the view of world " + world_.name + " shows nothing");
+    }
+    middle_ = world_.goal * Eigen::Vector3d(*distance * ray);
+  }
+
+  HandEyeResult run()
+  {
+    constexpr int MOST_TRIES = 100;
+    HandEyeView view;
+    view.k = world_.camera.k;
+    const auto corners = cornersOf(world_.region);
+    view.corners.assign(corners.begin(), corners.end());
+    std::vector<HandEyePose> poses;
+    for (int i = 0; i < MOST_TRIES && poses.size() < POSES; ++i)
+    {
+      if (const std::optional<HandEyePose> pose = observe(elsewhere()))
+      {
+        poses.push_back(*pose);
+      }
+    }
+    return calibrateHandEye(view, poses);
+  }
+
+  const Eigen::Isometry3d& truth() const
+  {
+    return camera_in_flange_;
+  }
+
+private:
+  static constexpr double IMAGE_NOISE = 2.0;
+  static constexpr int MARGIN = 16;  // of the region from that of the world [px]
+
+  static sim::PumaParams pumaParams(std::uint64_t seed)
+  {
+    sim::PumaParams params;
+    params.encoder_noise = 1e-4;
+    params.hand_eye_translation_error = 0.02;
+    params.hand_eye_rotation_error = 3.0 / DEGREES;
+    params.seed = seed;
+    return params;
+  }
+
+  bool hold(const Eigen::Isometry3d& camera)
+  {
+    return puma_.setCameraPose(world_.robot_base.inverse() * camera);
+  }
+
+  /** A pose from which somebody might look at the view: in a box around the goal, turned about the camera's axis. */
+  Eigen::Isometry3d elsewhere()
+  {
+    constexpr double SIDEWAYS = 0.2;  // [m]
+    constexpr double NEARER = 0.06;   // [m]
+    constexpr double FARTHER = 0.2;   // [m]
+    constexpr double BESIDE = 0.04;   // of the middle of the view, looked at [m]
+    constexpr double ROLL = 0.9;      // [rad]
+    const double x = uniform(rng_, -SIDEWAYS, SIDEWAYS);
+    const double y = uniform(rng_, -SIDEWAYS, SIDEWAYS);
+    const Eigen::Vector3d place = world_.goal * Eigen::Vector3d(x, y, uniform(rng_, -FARTHER, NEARER));
+    const double u = uniform(rng_, -BESIDE, BESIDE);
+    const Eigen::Vector3d at = middle_ + world_.goal.linear() * Eigen::Vector3d(u, uniform(rng_, -BESIDE, BESIDE), 0.0);
+    // Turned like the goal's camera: the shortest rotation from its direction to the new one.
+    const Eigen::Vector3d ahead = (at - place).normalized();
+    const Eigen::Quaterniond turn = Eigen::Quaterniond::FromTwoVectors(world_.goal.linear().col(2), ahead);
+    return Eigen::Translation3d(place) * Eigen::Isometry3d(turn * Eigen::Quaterniond(world_.goal.linear())) *
+           Eigen::AngleAxisd(uniform(rng_, -ROLL, ROLL), Eigen::Vector3d::UnitZ());
+  }
+
+  /** What the arm and the images say at a pose; empty when the arm cannot go there, or the view is not followed there. */
+  std::optional<HandEyePose> observe(const Eigen::Isometry3d& camera)
+  {
+    constexpr int MOST_IMAGES = 15;
+    constexpr double IMAGE_RATE = 10.0;  // [Hz]
+    if (!hold(camera))
+    {
+      return std::nullopt;
+    }
+    const Eigen::Isometry3d place = world_.robot_base * puma_.cameraPose();
+    const PlaneFinder::Answer answer = finder_.find({ view_, camera_.capture(place), std::nullopt });
+    if (!answer.h)
+    {
+      return std::nullopt;
+    }
+    PlaneTracker tracker(view_->grey(), world_.region, world_.camera.k, {});
+    tracker.start(*answer.h, std::nullopt);
+    const auto corners = cornersOf(world_.region);
+    StillPose still;
+    for (int i = 0; i < MOST_IMAGES; ++i)
+    {
+      ArmSample sample;
+      sample.stamp = i / IMAGE_RATE;
+      sample.flange_in_base = puma_.nominalCameraPose(puma_.measuredJoints()) * described_camera_in_flange_.inverse();
+      const PlaneTrack& track = tracker.add(camera_.capture(place), std::nullopt);
+      if (track.state != TrackingState::TRACKING)
+      {
+        still.clear();
+        continue;
+      }
+      Correspondences pairs;
+      for (const Eigen::Vector2d& corner : corners)
+      {
+        sample.seen.push_back(transfer(track.homography.h, corner));
+        pairs.push_back({ corner, Eigen::Vector2d::Zero() });
+      }
+      if (const std::optional<ArmSample> mean = still.add(sample))
+      {
+        for (std::size_t k = 0; k < pairs.size(); ++k)
+        {
+          pairs[k].current = mean->seen[k];
+        }
+        if (const std::optional<Eigen::Matrix3d> h = homographyFromPoints(pairs))
+        {
+          return HandEyePose{ mean->flange_in_base, *h };
+        }
+      }
+    }
+    return std::nullopt;
+  }
+
+  sim::World world_;
+  Rng rng_;
+  sim::SimulatedCamera camera_;
+  sim::Puma puma_;
+  PlaneFinder finder_;
+  std::shared_ptr<const PreparedImage> view_;
+  Eigen::Isometry3d described_camera_in_flange_;
+  Eigen::Isometry3d camera_in_flange_;
+  Eigen::Vector3d middle_;  // of the view, in the world [m]
+};
+
+// -------------------------------------------------------------------------------------------------------- real arm
+
+/** The pose of the camera on the hand, by the board with the size of its squares. */
+Eigen::Isometry3d byBoard(const ArmData& data, cv::HandEyeCalibrationMethod method)
+{
+  std::vector<cv::Mat> hand_rotations;
+  std::vector<cv::Mat> hand_translations;
+  std::vector<cv::Mat> board_rotations;
+  std::vector<cv::Mat> board_translations;
+  std::vector<cv::Point3d> board;
+  for (const Eigen::Vector3d& corner : ArmData::board())
+  {
+    board.emplace_back(corner.x(), corner.y(), corner.z());
+  }
+  cv::Mat k;
+  cv::eigen2cv(data.camera.k, k);
+  for (const ArmView& view : data.views)
+  {
+    std::vector<cv::Point2d> seen;
+    for (const Eigen::Vector2d& corner : view.corners)
+    {
+      seen.emplace_back(corner.x(), corner.y());
+    }
+    cv::Mat rotation;
+    cv::Mat translation;
+    cv::solvePnP(board, seen, k, cv::noArray(), rotation, translation);
+    cv::Mat matrix;
+    cv::Rodrigues(rotation, matrix);
+    board_rotations.push_back(matrix);
+    board_translations.push_back(translation);
+    cv::Mat hand_rotation;
+    cv::Mat hand_translation;
+    cv::eigen2cv(Eigen::Matrix3d(view.hand_in_base.linear()), hand_rotation);
+    cv::eigen2cv(Eigen::Vector3d(view.hand_in_base.translation()), hand_translation);
+    hand_rotations.push_back(hand_rotation);
+    hand_translations.push_back(hand_translation);
+  }
+  cv::Mat rotation;
+  cv::Mat translation;
+  cv::calibrateHandEye(hand_rotations, hand_translations, board_rotations, board_translations, rotation, translation,
+                       method);
+  Eigen::Matrix3d r;
+  Eigen::Vector3d t;
+  cv::cv2eigen(rotation, r);
+  cv::cv2eigen(translation, t);
+  Eigen::Isometry3d result = Eigen::Isometry3d::Identity();
+  result.linear() = r;
+  result.translation() = t;
+  return result;
+}
+
+/** The distance of the board from a camera, with the size of its squares [m]. */
+double distanceOfBoard(const ArmData& data, const ArmView& view)
+{
+  std::vector<cv::Point3d> board;
+  std::vector<cv::Point2d> seen;
+  const std::vector<Eigen::Vector3d> corners = ArmData::board();
+  for (std::size_t i = 0; i < corners.size(); ++i)
+  {
+    board.emplace_back(corners[i].x(), corners[i].y(), 0.0);
+    seen.emplace_back(view.corners[i].x(), view.corners[i].y());
+  }
+  cv::Mat k;
+  cv::Mat rotation;
+  cv::Mat translation;
+  cv::eigen2cv(data.camera.k, k);
+  cv::solvePnP(board, seen, k, cv::noArray(), rotation, translation);
+  cv::Mat matrix;
+  cv::Rodrigues(rotation, matrix);
+  return std::abs(matrix.col(2).dot(translation));
+}
+
+/** The pose of the camera on the hand, by the board's corners as one image has them. */
+HandEyeResult byView(const ArmData& data, std::size_t reference, double distance)
+{
+  HandEyeParams params;
+  params.distance = distance;
+  params.max_translation_sigma = std::numeric_limits<double>::infinity();  // the table tells how uncertain it is
+
+  const Points& seen = data.views[reference].corners;
+  HandEyeView view;
+  view.k = data.camera.k;
+  view.corners = { seen[0], seen[ArmData::COLUMNS - 1], seen[ArmData::CORNERS - 1],
+                   seen[ArmData::CORNERS - ArmData::COLUMNS] };
+  std::vector<HandEyePose> poses;
+  for (const ArmView& other : data.views)
+  {
+    Correspondences pairs;
+    for (std::size_t i = 0; i < seen.size(); ++i)
+    {
+      pairs.push_back({ seen[i], other.corners[i] });
+    }
+    const std::optional<Eigen::Matrix3d> h = homographyFromPoints(pairs);
+    if (!h)
+    {
+      throw std::runtime_error("corners of the board are not those of a plane");
+    }
+    poses.push_back({ other.hand_in_base, refineHomography(*h, pairs) });
+  }
+  return calibrateHandEye(view, poses, params);
+}
+
+void compare(const ArmData& data, const std::string& lens, std::ostream& csv)
+{
+  const Eigen::Isometry3d tsai = byBoard(data, cv::CALIB_HAND_EYE_TSAI);
+  const Eigen::Isometry3d park = byBoard(data, cv::CALIB_HAND_EYE_PARK);
+  std::cout << "lens " << lens << ": cv::calibrateHandEye with the board's size: Tsai and Park differ by "
+            << millimetresBetween(tsai, park) << " mm, " << degreesBetween(tsai, park) << " degrees" << std::endl;
+  for (std::size_t k = 0; k < 2 * data.views.size(); ++k)
+  {
+    const std::size_t i = k / 2;
+    const bool known = k % 2 == 1;
+    const double distance = distanceOfBoard(data, data.views[i]);
+    const HandEyeResult result = byView(data, i, known ? distance : std::numeric_limits<double>::quiet_NaN());
+    const double distance_error = 100.0 * (result.distance / distance - 1.0);
+    csv << lens << ',' << (known ? 1 : 0) << ',' << i + 1 << ',' << (result.found ? 1 : 0) << ',' << usedOf(result)
+        << ',' << millimetresBetween(result.camera_in_flange, tsai) << ','
+        << degreesBetween(result.camera_in_flange, tsai) << ',' << millimetresBetween(result.camera_in_flange, park)
+        << ',' << degreesBetween(result.camera_in_flange, park) << ',' << 1e3 * result.translationSigma() << ','
+        << DEGREES * result.rotationSigma() << ',' << result.image_error << ',' << 1e3 * result.translation_error << ','
+        << DEGREES * result.rotation_error << ',' << distance_error << ','
+        << result.camera_in_flange.translation().transpose().format(Eigen::IOFormat(6, Eigen::DontAlignCols, ",", ","))
+        << '\n';
+    std::cout << "  view " << i + 1 << ", distance " << (known ? "known" : "unknown") << ": " << usedOf(result)
+              << " poses, " << millimetresBetween(result.camera_in_flange, tsai) << " mm, "
+              << degreesBetween(result.camera_in_flange, tsai) << " degrees from Tsai's, "
+              << millimetresBetween(result.camera_in_flange, park) << " mm, "
+              << degreesBetween(result.camera_in_flange, park) << " degrees from Park's; sigma "
+              << 1e3 * result.translationSigma() << " mm, " << DEGREES * result.rotationSigma() << " degrees; distance "
+              << distance_error << " % " << result.message << std::endl;
+  }
+}
+
+}  // namespace
+
+void runHandEyeExperiment(const ExperimentContext& context, std::ostream& csv)
+{
+  struct Row
+  {
+    std::vector<double> millimetres;
+    std::vector<double> degrees;
+    int failures = 0;
+  };
+  std::ifstream urdf_file = openForReading(packageFolder() / "urdf" / "puma560.urdf");
+  const std::string urdf{ std::istreambuf_iterator<char>(urdf_file), std::istreambuf_iterator<char>() };
+  const auto runs = static_cast<std::size_t>(context.runsOf(HAND_EYE_RUNS));
+  std::map<std::string, sim::World> worlds;
+  for (const char* world : WORLDS)
+  {
+    worlds.emplace(world, sim::findWorld(world, packageFolder() / "config" / "worlds"));
+  }
+  std::vector<std::string> lines(runs * WORLDS.size());
+  std::map<std::string, Row> table;
+  std::mutex mutex;
+  inParallel(lines.size(), context.threads, [&](std::size_t i) {
+    const std::string world = WORLDS[i / runs];
+    Calibration calibration(worlds.at(world), urdf, context.seedOf(HAND_EYE_RUNS, i % runs + 1));
+    const HandEyeResult result = calibration.run();
+    const double millimetres = millimetresBetween(result.camera_in_flange, calibration.truth());
+    const double degrees = degreesBetween(result.camera_in_flange, calibration.truth());
+    std::ostringstream line;
+    line << world << ',' << i % runs << ',' << (result.found ? 1 : 0) << ',' << result.residuals.size() << ','
+         << usedOf(result) << ',' << millimetres << ',' << degrees << ',' << 1e3 * result.translationSigma() << ','
+         << DEGREES * result.rotationSigma() << ',' << result.image_error << ',' << 1e3 * result.translation_error
+         << ',' << DEGREES * result.rotation_error << ',' << inFrame(result.camera_in_flange, calibration.truth())
+         << '\n';
+    const std::lock_guard<std::mutex> lock(mutex);
+    lines[i] = line.str();
+    std::cerr << line.str() << (result.message.empty() ? "" : result.message + "\n") << std::flush;
+    Row& row = table[world];
+    if (result.found)
+    {
+      row.millimetres.push_back(millimetres);
+      row.degrees.push_back(degrees);
+    }
+    else
+    {
+      ++row.failures;
+    }
+  });
+  csv << "world,index,found,poses,used,translation_error_mm,rotation_error_deg,translation_sigma_mm,rotation_sigma_deg,"
+         "image_error_px,arm_translation_error_mm,arm_rotation_error_deg,x_mm,y_mm,z_mm,x_deg,y_deg,z_deg\n";
+  for (const std::string& line : lines)
+  {
+    csv << line;
+  }
+  for (const auto& [world, row] : table)
+  {
+    std::printf("%-6s %d of %zu failed", world.c_str(), row.failures, runs);
+    if (!row.millimetres.empty())
+    {
+      std::printf("; mean %.3f mm, %.4f degrees, largest %.3f mm, %.4f degrees", mean(row.millimetres),
+                  mean(row.degrees), largest(row.millimetres), largest(row.degrees));
+    }
+    std::printf("\n");
+  }
+}
+
+void runHandEyeRealExperiment(const ExperimentContext& context, std::ostream& csv)
+{
+  csv << "lens,known_distance,view,found,used,from_tsai_mm,from_tsai_deg,from_park_mm,from_park_deg,translation_sigma_"
+         "mm,"
+         "rotation_sigma_deg,image_error_px,arm_translation_error_mm,arm_rotation_error_deg,distance_error_percent,x,y,"
+         "z\n";
+  ArmData data = readArmData(context.data / "eyeinhand_franka_visp");
+  compare(data, "given", csv);
+  removeDistortion(data);
+  compare(data, "calibrated", csv);
+}
+
+}  // namespace view_servo

@@ -1,0 +1,242 @@
+// Copyright (c) 2026, the view_servo authors
+// SPDX-License-Identifier: BSD-3-Clause
+#include "tools/hand_eye_session.h"
+
+#include "view_servo/SetView.h"
+#include "view_servo/geometry/camera_warp.h"
+#include "view_servo/geometry/homography.h"
+#include "view_servo/geometry/region.h"
+#include "view_servo/geometry/rotation_vector.h"
+#include "view_servo/ros/call_service.h"
+#include "view_servo/ros/conversions.h"
+#include "view_servo/ros/image_source.h"
+#include "view_servo/ros/readiness.h"
+#include "view_servo/views/view_store.h"
+
+#include <ros/service.h>
+
+#include <stdexcept>
+
+namespace view_servo
+{
+namespace
+{
+constexpr double PATIENCE = 5.0;  // until what is needed is there [s]
+
+/** The corners of the view's region in images without distortion, as homography_tracker has them. */
+HandEyeView viewFor(const StoredView& stored, const Camera& camera)
+{
+  const CameraWarp warp(cameraOf(stored, camera), camera.rectified());
+  cv::Rect region = warp.region(stored.region);
+  if (region.empty())
+  {
+    if (warp.active())
+    {
+      throw std::runtime_error("nothing of the view's region is in this camera's picture once distortion is removed");
+    }
+    region = cv::Rect(cv::Point(), stored.image.size());
+  }
+  HandEyeView view;
+  view.k = warp.to().k;
+  const auto corners = cornersOf(region);
+  view.corners.assign(corners.begin(), corners.end());
+  return view;
+}
+
+}  // namespace
+
+HandEyeSession::HandEyeSession(const ros::NodeHandle& nh, const HandEyeSources& sources,
+                               const std::function<bool()>& given_up)
+  : sources_(sources)
+{
+  const StoredView stored = ViewStore(viewsDir(sources.views_dir)).load(sources.view);
+  const auto wait_for = [&](const std::function<std::string()>& missing) {
+    const std::string lacking = waitUntilReady(PATIENCE, missing, given_up);
+    if (!lacking.empty())
+    {
+      throw std::runtime_error(lacking);
+    }
+  };
+  ros::NodeHandle node(nh);
+  const std::string info_topic = node.resolveName(sources.camera + "/camera_info");
+  info_subscriber_ =
+      node.subscribe<sensor_msgs::CameraInfo>(info_topic, 1, [this](const sensor_msgs::CameraInfo::ConstPtr& message) {
+        const std::lock_guard<std::mutex> lock(mutex_);
+        info_ = message;
+      });
+  sensor_msgs::CameraInfo::ConstPtr info;
+  wait_for([&] {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    info = info_;
+    return info ? std::string()
+                : "no camera_info comes on '" + info_topic + "': start the camera's driver, or say --camera";
+  });
+  const Camera camera = toCamera(*info);
+  if (const std::string fault = camera.fault(); !fault.empty())
+  {
+    throw std::runtime_error("'" + info_topic + "': " + fault);
+  }
+  view_ = viewFor(stored, camera);
+  wait_for([&] {
+    const std::string missing = transforms_.missing(sources_.base_frame, sources_.flange_frame, ros::Time(0));
+    return missing.empty() ? missing : missing + ": say --base and --flange with the arm's frames";
+  });
+  const std::string start = sources.tracker + "/start";
+  wait_for([&] {
+    constexpr bool PRINT_FAILURE = false;
+    return ros::service::exists(start, PRINT_FAILURE)
+               ? std::string()
+               : "the node '" + sources_.tracker +
+                     "' does not run: roslaunch view_servo arm_servo.launch sim:=false odom_frame:=\"\" starts it";
+  });
+  SetView service;
+  service.request.view = sources.view;
+  if (!callService(start, service))
+  {
+    throw std::runtime_error("the service '" + start + "' does not answer");
+  }
+  if (service.response.success == 0)
+  {
+    throw std::runtime_error("view '" + sources.view + "' cannot be followed: " + service.response.message);
+  }
+  constexpr std::uint32_t QUEUE = 20;
+  homography_subscriber_ =
+      node.subscribe<Homography>(sources.tracker + "/homography", QUEUE, [this](const Homography::ConstPtr& message) {
+        constexpr std::size_t MOST = 100;
+        const std::lock_guard<std::mutex> lock(mutex_);
+        inbox_.push_back({ message, Clock::now() });
+        if (inbox_.size() > MOST)
+        {
+          inbox_.pop_front();
+        }
+      });
+}
+
+bool HandEyeSession::update()
+{
+  constexpr std::chrono::seconds SILENT{ 3 };
+  constexpr std::chrono::milliseconds TF_PATIENCE{ 500 };
+  bool added = false;
+  while (true)
+  {
+    Received next;
+    {
+      const std::lock_guard<std::mutex> lock(mutex_);
+      if (inbox_.empty())
+      {
+        break;
+      }
+      next = inbox_.front();
+    }
+    const Homography& message = *next.message;
+    last_message_ = next.time;
+    if (message.view != sources_.view)
+    {
+      still_.clear();
+      hindrance_ = "'" + sources_.tracker + "' follows " +
+                   (message.view.empty() ? "no view" : "another view, '" + message.view + "'") + ": call its ~start";
+    }
+    else if (message.refused)
+    {
+      throw std::runtime_error("view '" + message.view + "' cannot be followed: " + message.reason);
+    }
+    else if (!message.valid)
+    {
+      still_.clear();
+      at_known_pose_ = false;
+      hindrance_ = "the view is not followed: " + message.reason;
+    }
+    else
+    {
+      const std::string missing = transforms_.missing(sources_.base_frame, sources_.flange_frame, message.header.stamp);
+      if (missing.empty())
+      {
+        hindrance_.clear();
+        added = take(message) || added;
+      }
+      else if (Clock::now() < next.time + TF_PATIENCE)
+      {
+        break;  // it may come yet
+      }
+      else
+      {
+        hindrance_ = missing + ", when the image was taken";
+      }
+    }
+    const std::lock_guard<std::mutex> lock(mutex_);
+    if (!inbox_.empty() && inbox_.front().message == next.message)
+    {
+      inbox_.pop_front();
+    }
+  }
+  if (Clock::now() > last_message_ + SILENT)
+  {
+    still_.clear();
+    hindrance_ = "nothing comes from '" + sources_.tracker + "'";
+  }
+  return added;
+}
+
+/** @return whether a pose was added. */
+bool HandEyeSession::take(const Homography& message)
+{
+  ArmSample sample;
+  sample.stamp = message.header.stamp.toSec();
+  const Eigen::Matrix3d h = Eigen::Map<const Eigen::Matrix<double, 3, 3, Eigen::RowMajor>>(message.h.data());
+  for (const Eigen::Vector2d& corner : view_.corners)
+  {
+    const Eigen::Vector2d seen = transfer(h, corner);
+    if (!seen.allFinite())
+    {
+      return false;
+    }
+    sample.seen.push_back(seen);
+  }
+  constexpr double NO_WAIT = 0.0;
+  sample.flange_in_base = toIsometry(
+      transforms_.lookUp(sources_.base_frame, sources_.flange_frame, message.header.stamp, NO_WAIT).transform);
+  camera_frame_ = withoutSlash(message.header.frame_id);
+  const std::optional<ArmSample> still = still_.add(sample);
+  at_known_pose_ = false;
+  if (!still)
+  {
+    return false;
+  }
+  Correspondences corners;
+  for (std::size_t i = 0; i < view_.corners.size(); ++i)
+  {
+    corners.push_back({ view_.corners[i], still->seen[i] });
+  }
+  const std::optional<Eigen::Matrix3d> mean = homographyFromPoints(corners);
+  if (!mean)
+  {
+    return false;
+  }
+  const HandEyePose pose{ still->flange_in_base, *mean };
+  at_known_pose_ = !isNew(pose);
+  if (at_known_pose_)
+  {
+    return false;
+  }
+  poses_.push_back(pose);
+  at_known_pose_ = true;
+  return true;
+}
+
+/** Whether it is far enough from all that have been taken; poses beside each other tell little. */
+bool HandEyeSession::isNew(const HandEyePose& pose) const
+{
+  constexpr double FAR = 0.015;                  // [m]
+  constexpr double TURNED = 3.0 * M_PI / 180.0;  // [rad]
+  for (const HandEyePose& other : poses_)
+  {
+    const Eigen::Isometry3d way = other.flange_in_base.inverse() * pose.flange_in_base;
+    if (way.translation().norm() < FAR && rotationVector(way.linear()).norm() < TURNED)
+    {
+      return false;
+    }
+  }
+  return true;
+}
+
+}  // namespace view_servo
