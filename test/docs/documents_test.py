@@ -251,6 +251,10 @@ class Documented(unittest.TestCase):
                              for path in glob.glob(os.path.join(ROOT, "test", "rostest", "*.test")))
             for expression in words[3:]:
                 self.assertRegex(tests, expression)
+        elif words[0] == "scripts/fuzz":
+            # It builds everything anew with clang: that it knows the target has to do.
+            known = self.run_here(script + " there_is_no_such_one", 2).split("there are:")[1].split()
+            self.assertTrue(set(words[1:2]) <= set(known), known)
         elif words == ["scripts/test_releases"]:
             # It installs whole releases: that it starts, and knows what it is asked for, has to do.
             self.assertIn("unknown release 'nowhere'", self.run_here(script + " nowhere", 2))
