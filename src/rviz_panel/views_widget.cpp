@@ -11,6 +11,7 @@
 #include <ros/time.h>
 #include <QtCore/QSignalBlocker>
 #include <QtCore/QTimer>
+#include <QtGui/QIcon>
 #include <QtGui/QImage>
 #include <QtGui/QPixmap>
 #include <QtWidgets/QAbstractItemView>
@@ -383,7 +384,9 @@ void ViewsWidget::showViews(const RobotSnapshot& robot)
       {
         const cv::Mat& grey = view.thumbnail;
         const QImage image(grey.data, grey.cols, grey.rows, static_cast<int>(grey.step), QImage::Format_Grayscale8);
-        item->setIcon(QPixmap::fromImage(image));
+        QIcon icon(QPixmap::fromImage(image));
+        icon.addPixmap(QPixmap::fromImage(image), QIcon::Selected);  // not tinted
+        item->setIcon(icon);
       }
       views_->addItem(item);
       if (view.name == selected)
