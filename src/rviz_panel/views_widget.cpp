@@ -288,6 +288,7 @@ void ViewsWidget::start()
   link_ = std::make_unique<RobotLink>(names_);
   link_->showOverlay(isOverlayShown());
   shown_views_ = shown_words_ = shown_picture_ = 0;
+  shows_fault_ = false;
   camera_picture_.release();
   views_->clear();
   words_->clear();
@@ -348,7 +349,11 @@ void ViewsWidget::showPictures(const RobotSnapshot& robot)
     picture_->setPicture(shown.picture, !has_overlay);
     shown_picture_ = shown.count;
   }
-  shows_overlay_ = has_overlay;
+  if (has_overlay != shows_overlay_ || (has_region_ && picture_->region().empty()))
+  {
+    shows_overlay_ = has_overlay;
+    showRegion();
+  }
 }
 
 void ViewsWidget::showLight(const RobotSnapshot& robot)
@@ -369,8 +374,23 @@ void ViewsWidget::showLight(const RobotSnapshot& robot)
 
 void ViewsWidget::showViews(const RobotSnapshot& robot)
 {
-  if (robot.views_count != shown_views_)
+  // What was listed may have changed meanwhile, so it is not shown until the store is there again.
+  if (!robot.views_fault.empty())
   {
+    const QString text = toQt("No views: " + robot.views_fault);
+    if (!shows_fault_ || views_->item(0)->text() != text)
+    {
+      views_->clear();
+      auto* item = new QListWidgetItem(text);
+      item->setFlags(Qt::NoItemFlags);
+      views_->addItem(item);
+      shows_fault_ = true;
+    }
+    return;
+  }
+  if (robot.views_count != shown_views_ || shows_fault_)
+  {
+    shows_fault_ = false;
     shown_views_ = robot.views_count;
     const std::string selected = selectedView();
     views_->clear();
@@ -407,16 +427,6 @@ void ViewsWidget::showViews(const RobotSnapshot& robot)
       item.setToolTip(fault);
     }
   }
-  // What was listed may have changed meanwhile, so nothing else is said until the store is there again.
-  views_->setEnabled(robot.views_fault.empty());
-  if (!robot.views_fault.empty() && robot.words.text.empty())
-  {
-    words_->setText(toQt("No views: " + robot.views_fault));
-  }
-  else if (robot.words.text.empty())
-  {
-    words_->clear();
-  }
 }
 
 void ViewsWidget::showTopics(const RobotSnapshot& robot)
@@ -445,9 +455,11 @@ void ViewsWidget::showTopics(const RobotSnapshot& robot)
 void ViewsWidget::showRegion()
 {
   const cv::Rect region = picture_->region();
-  if (region.empty() || camera_picture_.empty())
+  has_region_ = !region.empty();
+  if (!has_region_ || camera_picture_.empty())
   {
-    region_->setText("Drag a region on the picture for Store; a click: everywhere");
+    region_->setText(shows_overlay_ ? "Untick 'Show matches' to drag a region for Store"
+                                    : "Drag a region on the picture for Store; a click: everywhere");
     region_->setStyleSheet("");
     return;
   }

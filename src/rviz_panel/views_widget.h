@@ -67,6 +67,8 @@ private:
   unsigned shown_words_ = 0;
   unsigned shown_picture_ = 0;
   bool shows_overlay_ = false;
+  bool shows_fault_ = false;  // in place of the views
+  bool has_region_ = false;
 
   PictureWidget* picture_ = nullptr;
   QLabel* region_ = nullptr;

@@ -94,6 +94,7 @@ NOT_FOR_USERS = {
         r"Show (Overlay|matches)",
         r"name of a new view",
         r"'Replace' ticked",
+        r"Untick 'Show matches' to drag a region for Store",
         r"(QPushButton \{ )?background: .*",
     ],
     "it says what was done or found as it was asked for": [
