@@ -382,7 +382,7 @@ void ViewsWidget::showViews(const RobotSnapshot& robot)
     {
       views_->clear();
       auto* item = new QListWidgetItem(text);
-      item->setFlags(Qt::NoItemFlags);
+      item->setFlags(Qt::ItemIsEnabled);
       views_->addItem(item);
       shows_fault_ = true;
     }
