@@ -446,6 +446,7 @@ int main(int argc, char** argv)
     std::vector<std::string> words;
     ros::removeROSArgs(argc, argv, words);
     std::vector<const char*> pointers;
+    pointers.reserve(words.size());
     for (const std::string& word : words)
     {
       pointers.push_back(word.c_str());
