@@ -44,7 +44,7 @@ Finding judgeImages(const CameraObservations& camera)
   return ok(name, found);
 }
 
-Finding judgePicture(const PictureMeasures& picture)
+Finding judgeContent(const PictureMeasures& picture)
 {
   constexpr double TOO_MUCH_WHITE = 0.25;  // part of the picture
   constexpr int FEW_CORNERS = 100;
@@ -151,6 +151,16 @@ std::string silence(const StreamObservations& stream, const std::string& what)
   return none + (stream.publisher.empty() ? ": nobody publishes it" : ", though " + stream.publisher + " publishes it");
 }
 
+Findings judgePicture(const PictureMeasures& picture)
+{
+  Findings findings = { judgeContent(picture) };
+  if (picture.lack_of_light.empty())
+  {
+    findings.push_back(judgeSharpness(picture));
+  }
+  return findings;
+}
+
 Findings judgeCamera(const CameraObservations& camera)
 {
   Findings findings = { judgeImages(camera) };
@@ -160,11 +170,7 @@ Findings judgeCamera(const CameraObservations& camera)
   }
   if (camera.picture)
   {
-    findings.push_back(judgePicture(*camera.picture));
-    if (camera.picture->lack_of_light.empty())
-    {
-      findings.push_back(judgeSharpness(*camera.picture));
-    }
+    append(findings, judgePicture(*camera.picture));
   }
   findings.push_back(judgePairing(camera));
   if (camera.pairing_fault.empty())

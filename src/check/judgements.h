@@ -14,6 +14,9 @@ namespace view_servo::check
 /** "images", "picture", "sharpness", "camera_info", "calibration", "image stamps". */
 Findings judgeCamera(const CameraObservations& camera);
 
+/** "picture" and, where there is enough light, "sharpness"; also of a part of a picture. */
+Findings judgePicture(const PictureMeasures& picture);
+
 /** "camera frame" and "tf", and for a base "camera mount". @param is_arm whether the camera is in an arm's hand. */
 Findings judgeMount(const MountObservations& mount, bool is_arm);
 

@@ -1,6 +1,7 @@
 // Copyright (c) 2026, the view_servo authors
 // SPDX-License-Identifier: BSD-3-Clause
 #include "tools/command_line.h"
+#include "tools/region_judgement.h"
 #include "tools/region_picker.h"
 #include "view_servo/SaveView.h"
 #include "view_servo/parameters/error_text.h"
@@ -235,7 +236,7 @@ cv::Mat withTexts(const cv::Mat& picture, const std::vector<std::pair<std::strin
 {
   constexpr double SIZE = 0.5;
   constexpr int LINE = 20;  // [px]
-  constexpr int LINES = 6;
+  constexpr int LINES = 8;
   constexpr int MARGIN = 8;  // [px]
   cv::Mat canvas;
   cv::copyMakeBorder(picture, canvas, 0, LINES * LINE, 0, 0, cv::BORDER_CONSTANT, cv::Scalar(40, 40, 40));
@@ -359,6 +360,15 @@ private:
                            : "Region: x " + std::to_string(region.x) + ", y " + std::to_string(region.y) + ", width " +
                                  std::to_string(region.width) + ", height " + std::to_string(region.height),
                        white);
+    if (!region.empty() && !picker_.isDragged())
+    {
+      if (region != judged_)
+      {
+        judged_ = region;
+        judgement_ = judgeRegion(image, region);
+      }
+      texts.emplace_back(judgement_.text, judgement_.is_good ? green : red);
+    }
     if (age > OLD_IMAGE)
     {
       texts.emplace_back("No image has come for " + std::to_string(static_cast<int>(age)) + " s on " + camera_.topic(),
@@ -380,6 +390,8 @@ private:
   const bool overwrite_;
   const LiveImage& camera_;
   RegionPicker picker_;
+  cv::Rect judged_;
+  RegionJudgement judgement_;  // of that
   Saving saving_;
   bool stored_ = false;
   std::optional<std::pair<bool, std::string>> outcome_;
@@ -434,6 +446,7 @@ int main(int argc, char** argv)
     std::vector<std::string> words;
     ros::removeROSArgs(argc, argv, words);
     std::vector<const char*> pointers;
+    pointers.reserve(words.size());
     for (const std::string& word : words)
     {
       pointers.push_back(word.c_str());

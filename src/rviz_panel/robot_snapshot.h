@@ -1,0 +1,90 @@
+// Copyright (c) 2026, the view_servo authors
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include "view_servo/ServoStatus.h"
+
+#include <opencv2/core/mat.hpp>
+
+#include <array>
+#include <chrono>
+#include <deque>
+#include <optional>
+#include <string>
+#include <vector>
+
+namespace view_servo
+{
+/** Where a robot's nodes and pictures are. */
+struct RobotNames
+{
+  std::string robot_namespace;                          ///< of its nodes; empty: none
+  std::string camera_topic = "camera/image_raw";        ///< in that namespace unless it begins with a slash
+  std::string overlay_topic = "point_matcher/overlay";  ///< likewise
+};
+
+bool operator==(const RobotNames& a, const RobotNames& b);
+
+/** A stored view, or a damaged one. */
+struct ListedView
+{
+  std::string name;
+  cv::Mat thumbnail;   ///< 8-bit grey, with the region drawn; empty when it is damaged
+  double stamp = 0.0;  ///< of its image [s of ROS time]; 0: not known
+  std::string fault;   ///< why it cannot be read; or empty
+};
+
+/** The newest picture of a topic. */
+struct TopicPicture
+{
+  std::string topic;                            ///< resolved; empty: none is subscribed
+  cv::Mat picture;                              ///< 8-bit BGR; empty while none has come
+  std::string fault;                            ///< why the last one cannot be shown; or empty
+  std::chrono::steady_clock::time_point since;  ///< when it came, or since when it is waited for
+  unsigned count = 0;                           ///< of pictures so far
+};
+
+/** What is known of a driver. */
+struct DriverState
+{
+  std::string kind;                   ///< "homing" or "servo_25d"
+  bool is_there = false;              ///< whether its action is served
+  std::optional<ServoStatus> status;  ///< the last one
+  std::optional<bool> enabled;        ///< its gate; none: not known
+  bool dry_run = false;
+  int level = 0;         ///< of its diagnostics, as diagnostic_msgs/DiagnosticStatus
+  double silence = 0.0;  ///< since its last diagnostics [s]; 0 before the first
+};
+
+/** What was left to go; NaN: not known. */
+struct ErrorSample
+{
+  std::chrono::steady_clock::time_point time;
+  double translation = 0.0;  ///< [m]
+  double rotation = 0.0;     ///< [rad]
+  double points = 0.0;       ///< [px]
+};
+
+/** What came of the last thing that was asked for. */
+struct Words
+{
+  std::string text;
+  bool is_good = true;
+  unsigned count = 0;  ///< of texts so far
+};
+
+/** All that a RobotLink knows. Pictures share their data, which nobody changes. */
+struct RobotSnapshot
+{
+  std::array<DriverState, 2> drivers;  ///< homing, servo_25d
+  std::deque<ErrorSample> errors;      ///< of the last minute, oldest first
+  std::vector<ListedView> views;
+  std::string views_fault;   ///< why they cannot be listed; or empty
+  unsigned views_count = 0;  ///< of changes of `views` so far
+  std::vector<std::string> image_topics;
+  TopicPicture camera;
+  TopicPicture overlay;
+  Words words;
+};
+
+}  // namespace view_servo

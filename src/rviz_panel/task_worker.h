@@ -1,0 +1,98 @@
+// Copyright (c) 2026, the view_servo authors
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <ros/node_handle.h>
+#include <ros/service_client.h>
+
+#include <chrono>
+#include <functional>
+#include <memory>
+#include <string>
+#include <thread>
+
+namespace view_servo
+{
+/** What came of calling a service. */
+struct CallOutcome
+{
+  enum Kind
+  {
+    ANSWERED,
+    NO_SERVICE,
+    LATE,     ///< it did not answer in time
+    FAILED,   ///< it reported a failure, or its node has gone
+    GIVEN_UP  ///< something else had to be done at once
+  };
+  Kind kind;
+  std::string text;  ///< what is wrong, in words; empty when it has answered
+};
+
+struct TaskQueue;
+
+/** Calls services for one task of a TaskWorker. */
+class ServiceCaller
+{
+public:
+  ServiceCaller(TaskQueue& queue, unsigned generation) : queue_(queue), generation_(generation)
+  {
+  }
+
+  /** @param name resolved. @param patience how long it may take [s]. */
+  template <typename Service>
+  CallOutcome call(const std::string& name, Service& service, double patience)
+  {
+    constexpr bool PERSISTENT = true;  // see callService(); and it is connected here, not by call()
+    ros::ServiceClient client = ros::NodeHandle().serviceClient<Service>(name, PERSISTENT);
+    if (!client.isValid())
+    {
+      return { CallOutcome::NO_SERVICE, "there is no service " + name };
+    }
+    if (!begin(client, patience))
+    {
+      return end(name, false, patience);
+    }
+    const bool answered = client.call(service);
+    return end(name, answered, patience);
+  }
+
+private:
+  bool begin(const ros::ServiceClient& client, double patience);
+  CallOutcome end(const std::string& name, bool answered, double patience);
+
+  TaskQueue& queue_;
+  const unsigned generation_;
+};
+
+/**
+ * Runs tasks one after the other in a thread of its own. Calls of services that are late, or that have to make room, are
+ * ended by expire(), as roscpp knows no deadline. Its methods do not wait, and are for one thread.
+ */
+class TaskWorker
+{
+public:
+  /** Must not throw. */
+  using Task = std::function<void(ServiceCaller&)>;
+
+  TaskWorker();
+  /** Waits for the running task, half a second at most; one that hangs longer, as in a dead network, is left behind. */
+  ~TaskWorker();
+  TaskWorker(const TaskWorker&) = delete;
+  TaskWorker& operator=(const TaskWorker&) = delete;
+
+  void add(Task task);
+  /** Drops what waits, gives up the calls of what runs, and runs the task next. */
+  void replace(Task task);
+  /** The same; it is the last one. */
+  void finish(Task task);
+  /** Ends calls that are late or given up. To be called often. */
+  void expire();
+  /** Whether nothing runs or waits. */
+  bool isIdle() const;
+
+private:
+  std::shared_ptr<TaskQueue> queue_;  // also of a thread that is left behind
+  std::thread thread_;
+};
+
+}  // namespace view_servo
