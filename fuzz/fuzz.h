@@ -50,11 +50,11 @@ void readOrRefuse(const Body& body)
   }
 }
 
-/** A directory of this process in memory, which goes when the process ends by itself. */
+/** A directory of this process, in memory where there is such a place, which goes when the process ends by itself. */
 class Directory
 {
 public:
-  Directory() : path_("/dev/shm/view_servo_fuzz_" + std::to_string(getpid()))
+  Directory() : path_(memory() / ("view_servo_fuzz_" + std::to_string(getpid())))
   {
     std::filesystem::create_directories(path_);
   }
@@ -80,6 +80,12 @@ public:
   }
 
 private:
+  static std::filesystem::path memory()
+  {
+    const std::filesystem::path shared = "/dev/shm";
+    return std::filesystem::is_directory(shared) ? shared : std::filesystem::temp_directory_path();
+  }
+
   std::filesystem::path path_;
 };
 
