@@ -30,10 +30,12 @@ RobotLight judgeDriver(const DriverState& driver)
   {
     return say(RobotLight::AMBER, "it has not said what it does");
   }
-  if (driver.enabled && !*driver.enabled && driver.status->state != ServoStatus::ABORTED)
+  if (driver.enabled && !*driver.enabled)
   {
+    // A goal that ended before the gate was closed is what the status still tells.
     light.colour = RobotLight::AMBER;
     light.text = driver.kind + ": disabled, does not drive until Enable";
+    light.text += driver.status->state == ServoStatus::ABORTED ? "; the last goal: " + reason : "";
     return light;
   }
   const bool has_error = driver.level >= diagnostic_msgs::DiagnosticStatus::ERROR;

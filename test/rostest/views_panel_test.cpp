@@ -169,7 +169,9 @@ TEST_F(ViewsPanelTest, StoresADraggedRegionDrivesAndStops)
   EXPECT_TRUE(waitForText("state", "homing: servoing")) << text("state");
 
   press("stop");
-  EXPECT_TRUE(waitForWidget([&] { return status.last()->state == ServoStatus::DISABLED; }));
+  // Whichever comes first ends the goal: its cancellation, or the closed gate.
+  EXPECT_TRUE(waitForWidget(
+      [&] { return status.last()->state == ServoStatus::DISABLED || status.last()->state == ServoStatus::ABORTED; }));
   EXPECT_TRUE(waitForText("words", "Stop: homing is disabled")) << text("words");
   EXPECT_TRUE(waitForWidget([&] {
     const geometry_msgs::Twist last = *commands.last();
