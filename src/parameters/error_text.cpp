@@ -4,6 +4,8 @@
 
 #include <opencv2/core.hpp>
 
+#include <algorithm>
+#include <cctype>
 #include <sstream>
 
 namespace view_servo
@@ -16,7 +18,10 @@ std::string oneLine(const std::exception& error)
                ? "memory is short"
                : "OpenCV's " + opencv_error->func + "() failed, which is a fault of this program";
   }
-  std::istringstream lines(error.what());
+  std::string text = error.what();
+  std::replace_if(
+      text.begin(), text.end(), [](unsigned char character) { return std::iscntrl(character) != 0; }, '\n');
+  std::istringstream lines(text);
   std::string joined;
   for (std::string line; std::getline(lines >> std::ws, line);)
   {

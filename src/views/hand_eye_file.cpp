@@ -2,6 +2,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "view_servo/views/hand_eye_file.h"
 
+#include "view_servo/parameters/error_text.h"
+
 #include <yaml-cpp/yaml.h>
 
 #include <cmath>
@@ -100,7 +102,7 @@ HandEyeFile readHandEyeFile(const std::string& path)
   }
   catch (const std::exception& error)
   {
-    throw std::runtime_error("no hand-eye calibration can be read from '" + path + "': " + error.what());
+    throw std::runtime_error("no hand-eye calibration can be read from '" + path + "': " + oneLine(error));
   }
 }
 

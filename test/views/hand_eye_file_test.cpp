@@ -99,6 +99,13 @@ TEST_F(HandEyeFileTest, NamesWhatIsWrong)
   nameless.replace(nameless.find("tool0"), 5, "''   ");
   EXPECT_TRUE(has(faultOf(nameless + TRANSFORMATION), "robot_effector_frame is empty"));
   EXPECT_TRUE(has(faultOf("parameters: ["), "no hand-eye calibration"));
+  // yaml-cpp puts the character that it does not know into its text, here a form feed or carriage return.
+  for (const std::string character : { "\f", "\v", "\r" })
+  {
+    const std::string fault = faultOf("parameters: \"\\" + character + "\"");
+    EXPECT_TRUE(has(fault, "no hand-eye calibration")) << fault;
+    EXPECT_EQ(fault.find_first_of("\n\r\f\v"), std::string::npos) << fault;
+  }
   std::filesystem::remove(path_);
   EXPECT_THROW(readHandEyeFile(path_), std::runtime_error);
   EXPECT_THROW(writeHandEyeFile({}, (directory_.path() / "nowhere" / "x.yaml").string()), std::runtime_error);
