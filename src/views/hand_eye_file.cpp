@@ -34,7 +34,7 @@ YAML::Node entry(const YAML::Node& map, const std::string& section, const std::s
 
 std::string frame(const YAML::Node& parameters, const std::string& name)
 {
-  const auto text = entry(parameters, "parameters", name).as<std::string>();
+  auto text = entry(parameters, "parameters", name).as<std::string>();
   if (text.empty())
   {
     throw std::runtime_error("parameters/" + name + " is empty");
