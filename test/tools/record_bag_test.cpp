@@ -4,7 +4,9 @@
 #include "sim/puma.h"
 #include "sim/world_reader.h"
 #include "sim_ros/robot_messages.h"
+#include "support/program_run.h"
 #include "support/temporary_directory.h"
+#include "support/text_file.h"
 #include "test_paths.h"
 #include "view_servo/ros/conversions.h"
 
@@ -18,14 +20,10 @@
 #include <opencv2/core.hpp>
 #include <opencv2/imgcodecs.hpp>
 
-#include <sys/wait.h>
-
 #include <algorithm>
 #include <cmath>
 #include <cstdlib>
 #include <filesystem>
-#include <fstream>
-#include <iterator>
 #include <map>
 #include <string>
 #include <vector>
@@ -98,13 +96,6 @@ trajectories:
     - {time: 0, position: [3, 0, 1], look_at: [4, 0, 0]}
 )";
 
-struct Outcome
-{
-  int status;
-  std::string out;
-  std::string err;
-};
-
 template <typename Message>
 std::vector<Message> messagesOf(const std::string& file, const std::string& topic)
 {
@@ -160,10 +151,10 @@ double sharpness(const Image& image)
          static_cast<double>(grey.total());
 }
 
-class RecordBag : public ::testing::Test
+class RecordBagTest : public ::testing::Test
 {
 protected:
-  RecordBag()
+  RecordBagTest()
   {
     nomad_ = writeNomadWorld("nomad.yaml", "");
     puma_ = writeText("puma.yaml", PUMA_WORLD);
@@ -177,35 +168,19 @@ protected:
 
   std::string writeText(const std::string& name, const std::string& text) const
   {
-    std::ofstream(path(name), std::ios::binary) << text;
-    return path(name);
+    return test::writeText(path(name), text);
   }
 
   /** @param camera more keys of the camera's entry. */
   std::string writeNomadWorld(const std::string& name, const std::string& camera) const
   {
-    std::string text = NOMAD_WORLD;
-    const std::string mark = "CAMERA";
-    return writeText(name, text.replace(text.find(mark), mark.size(), camera));
-  }
-
-  static std::string textOf(const std::string& file)
-  {
-    std::ifstream stream(file, std::ios::binary);
-    return { std::istreambuf_iterator<char>(stream), {} };
+    return writeText(name, edited(NOMAD_WORLD, "CAMERA", camera));
   }
 
   /** @param before commands that the shell carries out first. */
-  Outcome run(const std::vector<std::string>& arguments, const std::string& before = ":") const
+  static ProgramRun run(const std::vector<std::string>& arguments, const std::string& before = ":")
   {
-    std::string command = before + "; ROS_PACKAGE_PATH='" PACKAGE_DIR "' '" RECORD_BAG_PATH "'";
-    for (const std::string& argument : arguments)
-    {
-      command += " '" + argument + "'";
-    }
-    command += " > '" + path("stdout") + "' 2> '" + path("stderr") + "' < /dev/null";
-    const int status = std::system(command.c_str());
-    return { WIFEXITED(status) ? WEXITSTATUS(status) : -1, textOf(path("stdout")), textOf(path("stderr")) };
+    return runProgram(RECORD_BAG_PATH, arguments, before + "; export ROS_PACKAGE_PATH='" PACKAGE_DIR "'");
   }
 
   /** Records what should go well. @return the bag's file. */
@@ -214,7 +189,7 @@ protected:
   {
     std::vector<std::string> arguments{ world, "way", path(name) };
     arguments.insert(arguments.end(), more.begin(), more.end());
-    const Outcome outcome = run(arguments);
+    const ProgramRun outcome = run(arguments);
     EXPECT_EQ(outcome.status, 0);
     EXPECT_EQ(outcome.out + outcome.err, "");
     return path(name);
@@ -224,11 +199,7 @@ protected:
   void expectBadInput(const std::vector<std::string>& arguments, const std::string& culprit,
                       const std::string& before = ":") const
   {
-    const Outcome outcome = run(arguments, before);
-    EXPECT_EQ(outcome.status, 2) << culprit;
-    EXPECT_EQ(outcome.out, "");
-    EXPECT_EQ(std::count(outcome.err.begin(), outcome.err.end(), '\n'), 1) << outcome.err;
-    EXPECT_NE(outcome.err.find(culprit), std::string::npos) << outcome.err << " does not name " << culprit;
+    test::expectBadInput(run(arguments, before), culprit);
     for (const auto& entry : std::filesystem::directory_iterator(directory_.path()))
     {
       EXPECT_EQ(entry.path().string().find(out_), std::string::npos) << entry.path() << " is left";
@@ -243,7 +214,7 @@ private:
   TemporaryDirectory directory_;
 };
 
-TEST_F(RecordBag, HasTheTopicsOfANomad)
+TEST_F(RecordBagTest, HasTheTopicsOfANomad)
 {
   const std::string bag = record(nomad_);
   // 2 s, both ends included.
@@ -278,7 +249,7 @@ TEST_F(RecordBag, HasTheTopicsOfANomad)
   }
 }
 
-TEST_F(RecordBag, CompressesImagesWhenAsked)
+TEST_F(RecordBagTest, CompressesImagesWhenAsked)
 {
   const std::vector<Image> plain = messagesOf<Image>(record(nomad_, {}, "plain.bag"), IMAGES);
   const std::string bag = record(nomad_, { "--jpeg", "90" });
@@ -297,7 +268,7 @@ TEST_F(RecordBag, CompressesImagesWhenAsked)
   }
 }
 
-TEST_F(RecordBag, KeepsTheStaticTransformForThoseWhoComeLater)
+TEST_F(RecordBagTest, KeepsTheStaticTransformForThoseWhoComeLater)
 {
   const std::string file = record(nomad_);
   const rosbag::Bag bag(file);
@@ -308,7 +279,7 @@ TEST_F(RecordBag, KeepsTheStaticTransformForThoseWhoComeLater)
   }
 }
 
-TEST_F(RecordBag, FollowsTheTrajectory)
+TEST_F(RecordBagTest, FollowsTheTrajectory)
 {
   const sim::World world = sim::readWorld(nomad_);
   for (const Truth& truth : messagesOf<Truth>(record(nomad_), TRUTH))
@@ -321,24 +292,24 @@ TEST_F(RecordBag, FollowsTheTrajectory)
   }
 }
 
-TEST_F(RecordBag, IsTheSameForTheSameSeed)
+TEST_F(RecordBagTest, IsTheSameForTheSameSeed)
 {
   const std::vector<std::string> noise{ "--odometry-noise", "0.1" };
-  const std::string first = textOf(record(nomad_, noise, "a.bag"));
+  const std::string first = readText(record(nomad_, noise, "a.bag"));
   EXPECT_GT(first.size(), 1000U);
-  EXPECT_EQ(first, textOf(record(nomad_, noise, "b.bag")));
+  EXPECT_EQ(first, readText(record(nomad_, noise, "b.bag")));
 
   const std::string other = record(nomad_, { "--odometry-noise", "0.1", "--seed", "2" }, "c.bag");
   EXPECT_NE(messagesOf<Image>(path("a.bag"), IMAGES).back().data, messagesOf<Image>(other, IMAGES).back().data);
   EXPECT_NE(messagesOf<Odometry>(path("a.bag"), ODOMETRY).back().pose.pose.position.x,
             messagesOf<Odometry>(other, ODOMETRY).back().pose.pose.position.x);
 
-  const std::string arm = textOf(record(puma_, { "--encoder-noise", "0.001" }, "d.bag"));
-  EXPECT_EQ(arm, textOf(record(puma_, { "--encoder-noise", "0.001" }, "e.bag")));
-  EXPECT_NE(arm, textOf(record(puma_, { "--encoder-noise", "0.001", "--seed", "7" }, "f.bag")));
+  const std::string arm = readText(record(puma_, { "--encoder-noise", "0.001" }, "d.bag"));
+  EXPECT_EQ(arm, readText(record(puma_, { "--encoder-noise", "0.001" }, "e.bag")));
+  EXPECT_NE(arm, readText(record(puma_, { "--encoder-noise", "0.001", "--seed", "7" }, "f.bag")));
 }
 
-TEST_F(RecordBag, HasTheWorldsCalibration)
+TEST_F(RecordBagTest, HasTheWorldsCalibration)
 {
   for (const CameraInfo& info : messagesOf<CameraInfo>(record(nomad_), CAMERA_INFOS))
   {
@@ -357,7 +328,7 @@ TEST_F(RecordBag, HasTheWorldsCalibration)
   }
 }
 
-TEST_F(RecordBag, OdometryAgreesWithTheTruth)
+TEST_F(RecordBagTest, OdometryAgreesWithTheTruth)
 {
   const std::string bag = record(nomad_);
   const Eigen::Isometry3d camera_on_base = poseOf(messagesOf<TFMessage>(bag, TF_STATIC).at(0).transforms.at(0));
@@ -386,7 +357,7 @@ TEST_F(RecordBag, OdometryAgreesWithTheTruth)
   }
 }
 
-TEST_F(RecordBag, OdometryDriftsWhenToldSo)
+TEST_F(RecordBagTest, OdometryDriftsWhenToldSo)
 {
   const auto distance = [&](const std::string& bag) {
     const auto at = messagesOf<Odometry>(bag, ODOMETRY).back().pose.pose.position;
@@ -396,7 +367,7 @@ TEST_F(RecordBag, OdometryDriftsWhenToldSo)
   EXPECT_NEAR(distance(record(nomad_, { "--odometry-drift", "0.2" })), 1.2 * truth, 0.01 * truth);
 }
 
-TEST_F(RecordBag, HasTheTopicsOfAPuma)
+TEST_F(RecordBagTest, HasTheTopicsOfAPuma)
 {
   const std::string bag = record(puma_);
   const std::map<std::string, int> expected{
@@ -413,7 +384,7 @@ TEST_F(RecordBag, HasTheTopicsOfAPuma)
     truths[truth.header.stamp] = sim::toIsometry(truth.pose);
     EXPECT_LT((truths[truth.header.stamp].translation() - wanted.translation()).norm(), 0.03) << time;
   }
-  const sim::Puma puma(textOf(PACKAGE_DIR "/urdf/puma560.urdf"), sim::PumaParams());
+  const sim::Puma puma(readText(PACKAGE_DIR "/urdf/puma560.urdf"), sim::PumaParams());
   for (const JointState& state : messagesOf<JointState>(bag, JOINT_STATES))
   {
     EXPECT_EQ(state.name, puma.jointNames());
@@ -430,7 +401,7 @@ TEST_F(RecordBag, HasTheTopicsOfAPuma)
   }
 }
 
-TEST_F(RecordBag, EncodersAreNoisyWhenToldSo)
+TEST_F(RecordBagTest, EncodersAreNoisyWhenToldSo)
 {
   const auto exact = messagesOf<JointState>(record(puma_, {}, "a.bag"), JOINT_STATES);
   const auto noisy = messagesOf<JointState>(record(puma_, { "--encoder-noise", "0.01" }, "b.bag"), JOINT_STATES);
@@ -442,7 +413,7 @@ TEST_F(RecordBag, EncodersAreNoisyWhenToldSo)
   EXPECT_NEAR(std::sqrt(sum / static_cast<double>(exact.size())), 0.01, 0.005);
 }
 
-TEST_F(RecordBag, ShowsWhatTheOptionsSay)
+TEST_F(RecordBagTest, ShowsWhatTheOptionsSay)
 {
   const auto first = [&](const std::vector<std::string>& more) {
     std::vector<std::string> arguments{ "--image-noise", "0" };
@@ -457,7 +428,7 @@ TEST_F(RecordBag, ShowsWhatTheOptionsSay)
   EXPECT_LE(cv::norm(dimmed, first({ "--light-gain", "0.5", "--light-offset", "20" }), cv::NORM_INF), 1.0);
 }
 
-TEST_F(RecordBag, TakesRatesAndStart)
+TEST_F(RecordBagTest, TakesRatesAndStart)
 {
   const std::string bag =
       record(nomad_, { "--rate", "3", "--odometry-rate", "40", "--start-time", "12.5", "--groups", "extra" });
@@ -469,7 +440,7 @@ TEST_F(RecordBag, TakesRatesAndStart)
   EXPECT_EQ(messagesOf<Odometry>(bag, ODOMETRY).back().header.stamp, ros::Time(14.5));
 }
 
-TEST_F(RecordBag, BlursWhatMoves)
+TEST_F(RecordBagTest, BlursWhatMoves)
 {
   const std::vector<std::string> no_noise{ "--image-noise", "0" };
   const auto sharp = messagesOf<Image>(record(nomad_, no_noise, "a.bag"), IMAGES);
@@ -479,16 +450,16 @@ TEST_F(RecordBag, BlursWhatMoves)
   EXPECT_LT(sharpness(blurred[6]), 0.9 * sharpness(sharp[6]));
 }
 
-TEST_F(RecordBag, FindsTheWorldsOfThePackage)
+TEST_F(RecordBagTest, FindsTheWorldsOfThePackage)
 {
-  const Outcome outcome = run({ "desk", "lose", out_, "--rate", "0.1", "--image-noise", "0" });
+  const ProgramRun outcome = run({ "desk", "lose", out_, "--rate", "0.1", "--image-noise", "0" });
   EXPECT_EQ(outcome.status, 0) << outcome.err;
   const std::vector<Image> images = messagesOf<Image>(out_, IMAGES);
   ASSERT_EQ(images.size(), 2U);
   EXPECT_EQ(images[0].width, 640U);
 }
 
-TEST_F(RecordBag, RefusesWhatIsUnknown)
+TEST_F(RecordBagTest, RefusesWhatIsUnknown)
 {
   expectBadInput({}, "WORLD TRAJECTORY OUT.bag");
   expectBadInput({ nomad_, out_ }, "WORLD TRAJECTORY OUT.bag");
@@ -503,7 +474,7 @@ TEST_F(RecordBag, RefusesWhatIsUnknown)
   expectBadInput({ nomad_, "way", out_, "--rate" }, "--rate");
 }
 
-TEST_F(RecordBag, RefusesNumbersOutOfRange)
+TEST_F(RecordBagTest, RefusesNumbersOutOfRange)
 {
   for (const std::string option : { "--rate", "--odometry-rate", "--start-time", "--image-noise", "--light-gain",
                                     "--light-offset", "--focal-length-error", "--odometry-drift", "--odometry-noise" })
@@ -519,7 +490,7 @@ TEST_F(RecordBag, RefusesNumbersOutOfRange)
   expectBadInput({ nomad_, "way", out_, "--rate", "101" }, "--rate");
 }
 
-TEST_F(RecordBag, RefusesWhatTheRobotDoesNotHave)
+TEST_F(RecordBagTest, RefusesWhatTheRobotDoesNotHave)
 {
   expectBadInput({ nomad_, "way", out_, "--encoder-noise", "0.1" }, "--encoder-noise");
   expectBadInput({ puma_, "way", out_, "--odometry-noise", "0.1" }, "--odometry-noise");
@@ -527,7 +498,7 @@ TEST_F(RecordBag, RefusesWhatTheRobotDoesNotHave)
   expectBadInput({ puma_, "way", out_, "--urdf", path("none.urdf") }, path("none.urdf"));
 }
 
-TEST_F(RecordBag, RefusesWaysThatCannotBeFollowed)
+TEST_F(RecordBagTest, RefusesWaysThatCannotBeFollowed)
 {
   expectBadInput({ nomad_, "crash", out_ }, "the pillar");
   expectBadInput({ nomad_, "inside", out_ }, "the pillar");
@@ -535,7 +506,7 @@ TEST_F(RecordBag, RefusesWaysThatCannotBeFollowed)
   expectBadInput({ puma_, "far", out_ }, "'far'");
 }
 
-TEST_F(RecordBag, RefusesFilesThatCannotBeWritten)
+TEST_F(RecordBagTest, RefusesFilesThatCannotBeWritten)
 {
   expectBadInput({ nomad_, "way", path("none/out.bag") }, path("none/out.bag"));
   std::filesystem::create_directory(path("folder"));
@@ -545,18 +516,18 @@ TEST_F(RecordBag, RefusesFilesThatCannotBeWritten)
 #endif
 }
 
-TEST_F(RecordBag, SparesAnOldBagWhenItFails)
+TEST_F(RecordBagTest, SparesAnOldBagWhenItFails)
 {
   const std::string old = writeText("old.bag", "old");
   EXPECT_EQ(run({ nomad_, "crash", old }).status, 2);
-  EXPECT_EQ(textOf(old), "old");
+  EXPECT_EQ(readText(old), "old");
 }
 
 /** A folder of images with poses, as others recorded it. */
-class RecordImages : public RecordBag
+class RecordBagImagesTest : public RecordBagTest
 {
 protected:
-  RecordImages()
+  RecordBagImagesTest()
   {
     std::filesystem::create_directories(path("walk/images"));
     cv::Mat picture(60, 80, CV_8UC3);
@@ -582,7 +553,7 @@ protected:
   }
 };
 
-TEST_F(RecordImages, AreWrittenWithTheirPoses)
+TEST_F(RecordBagImagesTest, AreWrittenWithTheirPoses)
 {
   ASSERT_EQ(run(arguments()).status, 0);
   const std::map<std::string, int> expected{ { CAMERA_INFOS, 2 }, { IMAGES, 2 }, { TRUTH, 2 } };
@@ -599,12 +570,12 @@ TEST_F(RecordImages, AreWrittenWithTheirPoses)
   const Eigen::Isometry3d pose = sim::toIsometry(messagesOf<Truth>(out_, TRUTH)[1].pose);
   EXPECT_TRUE(pose.translation().isApprox(Eigen::Vector3d(1.0, 2.0, 3.0)));
   EXPECT_TRUE(pose.linear().col(2).isApprox(Eigen::Vector3d::UnitX()));
-  const std::string bytes = textOf(out_);
+  const std::string bytes = readText(out_);
   ASSERT_EQ(run(arguments()).status, 0);
-  EXPECT_EQ(textOf(out_), bytes);
+  EXPECT_EQ(readText(out_), bytes);
 }
 
-TEST_F(RecordImages, RefusesBadFolders)
+TEST_F(RecordBagImagesTest, RefusesBadFolders)
 {
   expectBadInput({ "--images", path("none"), out_ }, path("none"));
   expectBadInput({ "--images", path("walk") }, "OUT.bag");
@@ -627,7 +598,7 @@ TEST_F(RecordImages, RefusesBadFolders)
   expectBadInput(arguments(), "K.txt");
 }
 
-TEST_F(RecordImages, AreThoseOfARealWalk)
+TEST_F(RecordBagImagesTest, AreThoseOfARealWalk)
 {
   const char* data = std::getenv("VIEW_SERVO_DATA");
   if (data == nullptr)
