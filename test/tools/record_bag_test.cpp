@@ -1,13 +1,10 @@
 // Copyright (c) 2026, the view_servo authors
 // SPDX-License-Identifier: BSD-3-Clause
-// Runs the program itself, as a shell would, and reads what it wrote.
+#include "record_bag_test.h"
+
 #include "sim/puma.h"
 #include "sim/world_reader.h"
 #include "sim_ros/robot_messages.h"
-#include "support/program_run.h"
-#include "support/temporary_directory.h"
-#include "support/text_file.h"
-#include "test_paths.h"
 #include "view_servo/ros/conversions.h"
 
 #include <gtest/gtest.h>
@@ -16,13 +13,11 @@
 #include <sensor_msgs/CompressedImage.h>
 #include <sensor_msgs/Image.h>
 #include <sensor_msgs/image_encodings.h>
-#include <tf2_msgs/TFMessage.h>
 #include <opencv2/core.hpp>
 #include <opencv2/imgcodecs.hpp>
 
 #include <algorithm>
 #include <cmath>
-#include <cstdlib>
 #include <filesystem>
 #include <map>
 #include <string>
@@ -34,98 +29,6 @@ namespace test
 {
 namespace
 {
-using nav_msgs::Odometry;
-using sensor_msgs::CameraInfo;
-using sensor_msgs::Image;
-using sensor_msgs::JointState;
-using tf2_msgs::TFMessage;
-using Truth = geometry_msgs::PoseStamped;
-
-const std::string IMAGES = "/camera/image_raw";
-const std::string CAMERA_INFOS = "/camera/camera_info";
-const std::string TRUTH = "/ground_truth";
-const std::string ODOMETRY = "/odom";
-const std::string JOINT_STATES = "/joint_states";
-const std::string TF = "/tf";
-const std::string TF_STATIC = "/tf_static";
-
-constexpr double DEGREE = M_PI / 180.0;
-
-/** Ends of the camera's entry are left open for each test. */
-const std::string NOMAD_WORLD = R"(
-robot: {kind: nomad, camera_height: 0.8}
-camera: {width: 160, height: 120, fx: 130, fy: 132, cx: 81, cy: 58, noise: 2CAMERA}
-textures:
-  wall: {kind: blotches, size: [256, 128], seed: 3}
-  poster: {kind: poster, size: [128, 128], seed: 4, count: 3}
-rectangles:
-  - {name: wall, size: [8, 3], position: [3, 0, 1], facing: [-1, 0, 0], texture: wall}
-  - {name: poster, group: extra, size: [1, 1], position: [2.9, 0, 1], facing: [-1, 0, 0], texture: poster}
-boxes:
-  - {name: the pillar, size: [0.3, 0.3, 2], position: [1.5, 1.2, 0], texture: wall}
-goal: {x: 0, y: 0}
-trajectories:
-  way:
-    - {time: 5, x: -0.5, y: 0.2}
-    - {time: 6, x: -0.3, y: 0.1, yaw_deg: 10}
-    - {time: 7, x: -0.1, y: 0.1, yaw_deg: -10}
-  crash:
-    - {time: 0, x: 0.5, y: 1.2}
-    - {time: 4, x: 1.5, y: 1.2}
-  inside:
-    - {time: 0, x: 1.5, y: 1.2}
-  long:
-    - {time: 0, x: 0, y: 0}
-    - {time: 3601, x: 0, y: 0}
-)";
-
-const std::string PUMA_WORLD = R"(
-robot: {kind: puma, position: [0.2, 0.1, 0.05], yaw_deg: 30}
-camera: {width: 160, height: 120, fx: 130}
-textures:
-  table: {kind: poster, size: [256, 256], seed: 5}
-rectangles:
-  - {name: table, size: [2, 2], position: [0.6, 0, 0], facing: [0, 0, 1], texture: table}
-goal: {position: [0.7, 0.3, 0.8], look_at: [0.8, 0.35, 0]}
-trajectories:
-  way:
-    - {time: 0, position: [0.75, 0.25, 0.75], look_at: [0.85, 0.35, 0]}
-    - {time: 1, position: [0.7, 0.3, 0.8], look_at: [0.8, 0.35, 0], roll_deg: 8}
-    - {time: 2, position: [0.7, 0.35, 0.8], look_at: [0.8, 0.35, 0]}
-  far:
-    - {time: 0, position: [3, 0, 1], look_at: [4, 0, 0]}
-)";
-
-template <typename Message>
-std::vector<Message> messagesOf(const std::string& file, const std::string& topic)
-{
-  const rosbag::Bag bag(file);
-  std::vector<Message> messages;
-  for (const rosbag::MessageInstance& instance : rosbag::View(bag, rosbag::TopicQuery(topic)))
-  {
-    const auto message = instance.instantiate<Message>();
-    EXPECT_TRUE(message) << topic << " holds " << instance.getDataType();
-    messages.push_back(*message);
-  }
-  return messages;
-}
-
-/** Messages a topic has; their stamps in the bag must increase. */
-std::map<std::string, int> topicsOf(const std::string& file)
-{
-  const rosbag::Bag bag(file);
-  std::map<std::string, int> counts;
-  std::map<std::string, ros::Time> last;
-  for (const rosbag::MessageInstance& instance : rosbag::View(bag))
-  {
-    const std::string topic = instance.getTopic();
-    EXPECT_GT(instance.getTime(), last[topic]) << topic;
-    last[topic] = instance.getTime();
-    ++counts[topic];
-  }
-  return counts;
-}
-
 Eigen::Isometry3d poseOf(const geometry_msgs::TransformStamped& transform)
 {
   geometry_msgs::Pose pose;
@@ -150,69 +53,6 @@ double sharpness(const Image& image)
   return cv::norm(grey.colRange(1, grey.cols), grey.colRange(0, grey.cols - 1), cv::NORM_L1) /
          static_cast<double>(grey.total());
 }
-
-class RecordBagTest : public ::testing::Test
-{
-protected:
-  RecordBagTest()
-  {
-    nomad_ = writeNomadWorld("nomad.yaml", "");
-    puma_ = writeText("puma.yaml", PUMA_WORLD);
-    out_ = path("out.bag");
-  }
-
-  std::string path(const std::string& name) const
-  {
-    return directory_.path() / name;
-  }
-
-  std::string writeText(const std::string& name, const std::string& text) const
-  {
-    return test::writeText(path(name), text);
-  }
-
-  /** @param camera more keys of the camera's entry. */
-  std::string writeNomadWorld(const std::string& name, const std::string& camera) const
-  {
-    return writeText(name, edited(NOMAD_WORLD, "CAMERA", camera));
-  }
-
-  /** @param before commands that the shell carries out first. */
-  static ProgramRun run(const std::vector<std::string>& arguments, const std::string& before = ":")
-  {
-    return runProgram(RECORD_BAG_PATH, arguments, before + "; export ROS_PACKAGE_PATH='" PACKAGE_DIR "'");
-  }
-
-  /** Records what should go well. @return the bag's file. */
-  std::string record(const std::string& world, const std::vector<std::string>& more = {},
-                     const std::string& name = "out.bag") const
-  {
-    std::vector<std::string> arguments{ world, "way", path(name) };
-    arguments.insert(arguments.end(), more.begin(), more.end());
-    const ProgramRun outcome = run(arguments);
-    EXPECT_EQ(outcome.status, 0);
-    EXPECT_EQ(outcome.out + outcome.err, "");
-    return path(name);
-  }
-
-  /** Status 2, one line that names `culprit`, and no file. */
-  void expectBadInput(const std::vector<std::string>& arguments, const std::string& culprit,
-                      const std::string& before = ":") const
-  {
-    test::expectBadInput(run(arguments, before), culprit);
-    for (const auto& entry : std::filesystem::directory_iterator(directory_.path()))
-    {
-      EXPECT_EQ(entry.path().string().find(out_), std::string::npos) << entry.path() << " is left";
-    }
-  }
-
-  std::string nomad_;
-  std::string puma_;
-  std::string out_;
-
-private:
-  TemporaryDirectory directory_;
-};
 
 TEST_F(RecordBagTest, HasTheTopicsOfANomad)
 {
@@ -521,98 +361,6 @@ TEST_F(RecordBagTest, SparesAnOldBagWhenItFails)
   const std::string old = writeText("old.bag", "old");
   EXPECT_EQ(run({ nomad_, "crash", old }).status, 2);
   EXPECT_EQ(readText(old), "old");
-}
-
-/** A folder of images with poses, as others recorded it. */
-class RecordBagImagesTest : public RecordBagTest
-{
-protected:
-  RecordBagImagesTest()
-  {
-    std::filesystem::create_directories(path("walk/images"));
-    cv::Mat picture(60, 80, CV_8UC3);
-    for (const std::string name : { "7.png", "8.png", "9.png" })
-    {
-      cv::randu(picture, 0, 255);
-      EXPECT_TRUE(cv::imwrite(path("walk/images/" + name), picture));
-    }
-    writeText("walk/K.txt", "5e1 0 39\n0 51 29\n0 0 1\n");
-    writePoses(
-        "# a remark\n7.png 1 0 0 0.1  0 1 0 0.2  0 0 1 0.3  0 0 0 1\n"
-        "9.png 0 0 1 1  -1 0 0 2  0 -1 0 3  0 0 0 1\n");
-  }
-
-  void writePoses(const std::string& text) const
-  {
-    writeText("walk/poses.txt", text);
-  }
-
-  std::vector<std::string> arguments() const
-  {
-    return { "--images", path("walk"), out_ };
-  }
-};
-
-TEST_F(RecordBagImagesTest, AreWrittenWithTheirPoses)
-{
-  ASSERT_EQ(run(arguments()).status, 0);
-  const std::map<std::string, int> expected{ { CAMERA_INFOS, 2 }, { IMAGES, 2 }, { TRUTH, 2 } };
-  EXPECT_EQ(topicsOf(out_), expected);
-  const std::vector<Image> images = messagesOf<Image>(out_, IMAGES);
-  EXPECT_EQ(toGrey(images[1], "image").size(), cv::Size(80, 60));
-  EXPECT_EQ(images[1].header.stamp, ros::Time(1000.25));
-  EXPECT_EQ(images[1].encoding, sensor_msgs::image_encodings::MONO8);
-  const CameraInfo info = messagesOf<CameraInfo>(out_, CAMERA_INFOS)[1];
-  EXPECT_EQ(info.header, images[1].header);
-  EXPECT_EQ(info.K[0], 50.0);
-  EXPECT_EQ(info.P[6], 29.0);
-  EXPECT_EQ(info.width, 80U);
-  const Eigen::Isometry3d pose = sim::toIsometry(messagesOf<Truth>(out_, TRUTH)[1].pose);
-  EXPECT_TRUE(pose.translation().isApprox(Eigen::Vector3d(1.0, 2.0, 3.0)));
-  EXPECT_TRUE(pose.linear().col(2).isApprox(Eigen::Vector3d::UnitX()));
-  const std::string bytes = readText(out_);
-  ASSERT_EQ(run(arguments()).status, 0);
-  EXPECT_EQ(readText(out_), bytes);
-}
-
-TEST_F(RecordBagImagesTest, RefusesBadFolders)
-{
-  expectBadInput({ "--images", path("none"), out_ }, path("none"));
-  expectBadInput({ "--images", path("walk") }, "OUT.bag");
-  expectBadInput({ "--images", path("walk"), "desk", "way", out_ }, "OUT.bag");
-  expectBadInput({ "--images", path("walk"), out_, "--seed", "3" }, "--seed");
-  for (const std::string line :
-       { "7.png 1 2 3", "7.png 2 0 0 0  0 2 0 0  0 0 2 0  0 0 0 1", "7.png 1 0 0 nan  0 1 0 0  0 0 1 0  0 0 0 1",
-         "7.png 1 0 0 0  0 1 0 0  0 0 -1 0  0 0 0 1" })
-  {
-    writePoses("# remark\n" + line + "\n");
-    expectBadInput(arguments(), "poses.txt: line 2 ");
-  }
-  writePoses("# nothing\n");
-  expectBadInput(arguments(), "poses.txt");
-  writePoses("7.png 1 0 0 0.1  0 1 0 0.2  0 0 1 0.3  0 0 0 1\ngone.png 1 0 0 0  0 1 0 0  0 0 1 0  0 0 0 1\n");
-  expectBadInput(arguments(), "gone.png");
-  ASSERT_TRUE(cv::imwrite(path("walk/images/gone.png"), cv::Mat(30, 40, CV_8U, cv::Scalar(0))));
-  expectBadInput(arguments(), "gone.png");
-  writeText("walk/K.txt", "1 2 3");
-  expectBadInput(arguments(), "K.txt");
-}
-
-TEST_F(RecordBagImagesTest, AreThoseOfARealWalk)
-{
-  const char* data = std::getenv("VIEW_SERVO_DATA");
-  if (data == nullptr)
-  {
-    GTEST_SKIP() << "VIEW_SERVO_DATA is not set";
-  }
-  ASSERT_EQ(run({ "--images", std::string(data) + "/hololens_indoor", out_ }).status, 0);
-  EXPECT_EQ(topicsOf(out_).at(IMAGES), 94);
-  EXPECT_EQ(topicsOf(out_).at(TRUTH), 94);
-  EXPECT_LT(std::filesystem::file_size(out_), 15'000'000U);
-  // The folder's own relative pose of two images, first in its list of pairs: X_6 = T X_1.
-  const std::vector<Truth> truths = messagesOf<Truth>(out_, TRUTH);
-  const Eigen::Isometry3d relative = sim::toIsometry(truths[5].pose).inverse() * sim::toIsometry(truths[0].pose);
-  EXPECT_LT((relative.translation() - Eigen::Vector3d(0.13428, 0.10470, -0.29566)).norm(), 2e-4);
 }
 
 }  // namespace
