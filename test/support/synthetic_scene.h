@@ -128,6 +128,17 @@ inline Scene makeScene(const SceneOptions& options, Rng& rng)
   return scene;
 }
 
+/** A scene without outliers. @param noise as in SceneOptions. */
+inline Scene makeScene(int points, double noise, std::uint64_t seed, bool planar = false)
+{
+  Rng rng(seed);
+  SceneOptions options;
+  options.inliers = points;
+  options.noise = noise;
+  options.planar = planar;
+  return makeScene(options, rng);
+}
+
 /** Exact pairs of `count` points in a cube seen in two scaled-orthographic views of different scale and direction. */
 inline Correspondences scaledOrthographicPairs(int count, Rng& rng)
 {
