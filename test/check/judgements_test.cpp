@@ -132,7 +132,7 @@ void expectOnly(const Case& expected, Everything all)
   }
 }
 
-TEST(CheckJudgements, AllIsWell)
+TEST(CheckJudgements, FindNothingWhereAllIsWell)
 {
   for (const Everything& all : { wellBase(), wellArm() })
   {
@@ -147,7 +147,7 @@ TEST(CheckJudgements, AllIsWell)
   }
 }
 
-TEST(CheckJudgements, Camera)
+TEST(CheckJudgements, NameEachFaultOfTheCamera)
 {
   const std::vector<Case> cases = {
     { "slow", [](Everything& a) { a.camera.images.rate = 2.0; }, "images", Level::WARNING, "2.0 Hz" },
@@ -186,7 +186,7 @@ TEST(CheckJudgements, Camera)
              wellArm());
 }
 
-TEST(CheckJudgements, NothingIsSaidOfImagesThatDoNotCome)
+TEST(CheckJudgements, SayNothingOfImagesThatDoNotCome)
 {
   Everything all = wellBase();
   all.camera = CameraObservations();
@@ -200,7 +200,7 @@ TEST(CheckJudgements, NothingIsSaidOfImagesThatDoNotCome)
             "no image has come on '/camera/image_raw', though /camera publishes it");
 }
 
-TEST(CheckJudgements, Mount)
+TEST(CheckJudgements, NameEachFaultOfTheMount)
 {
   const Eigen::Vector3d x = Eigen::Vector3d::UnitX();
   const Eigen::Vector3d y = Eigen::Vector3d::UnitY();
@@ -254,7 +254,7 @@ TEST(CheckJudgements, Mount)
   }
 }
 
-TEST(CheckJudgements, Odometry)
+TEST(CheckJudgements, NameEachFaultOfOdometry)
 {
   const std::vector<Case> cases = {
     { "slow", [](Everything& a) { a.odometry.stream.rate = 5.0; }, "odometry", Level::WARNING, "5.0 Hz" },
@@ -287,7 +287,7 @@ TEST(CheckJudgements, Odometry)
   EXPECT_EQ(findings[0].message, "no odometry has come on '/odom': nobody publishes it");
 }
 
-TEST(CheckJudgements, CommandsAndJoints)
+TEST(CheckJudgements, NameEachFaultOfCommandsAndJoints)
 {
   const std::vector<Case> base = {
     { "no listener", [](Everything& a) { a.commands.listeners.clear(); }, "commands", Level::ERROR, "nobody listens" },
@@ -321,7 +321,7 @@ TEST(CheckJudgements, CommandsAndJoints)
   }
 }
 
-TEST(CheckJudgements, Machine)
+TEST(CheckJudgements, NameEachFaultOfTheMachine)
 {
   const std::vector<Case> cases = {
     { "a clock that stands",

@@ -5,9 +5,9 @@
 
 #include "sim/renderer.h"
 #include "sim/world_reader.h"
+#include "support/shipped_files.h"
 
 #include <gtest/gtest.h>
-#include <test_paths.h>
 
 #include <cmath>
 #include <string>
@@ -96,8 +96,7 @@ TEST(CheckMotion, JudgesWhoIsWrong)
 class Scene
 {
 public:
-  explicit Scene(const std::string& name)
-    : world_(sim::findWorld(name, std::string(PACKAGE_DIR) + "/config/worlds")), camera_(world_, {}, 1)
+  explicit Scene(const std::string& name) : world_(sim::readWorld(test::worldFile(name))), camera_(world_, {}, 1)
   {
   }
 

@@ -2,7 +2,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "view_servo/control/heading_hypotheses.h"
 
-#include "support/synthetic_scene.h"
+#include "support/level_matches.h"
 
 #include <gtest/gtest.h>
 
@@ -18,35 +18,24 @@ namespace view_servo
 {
 namespace
 {
-constexpr double FOCAL_LENGTH = 520.0;  // [px]
+using test::FOCAL_LENGTH;
+using test::inCurrentCamera;
+using test::inImage;
+using test::noisy;
+using test::randomPosition;
+
 constexpr double DEGREE = M_PI / 180.0;
-
-Eigen::Vector2d randomPosition(Rng& rng)
-{
-  const double x = uniform(rng, -0.615, 0.615);
-  return { x, uniform(rng, -0.46, 0.46) };
-}
-
-Eigen::Vector2d noisy(const Eigen::Vector2d& position, Rng& rng)
-{
-  constexpr double NOISE = 0.5 / FOCAL_LENGTH;
-  const double x = position.x() + NOISE * gaussian(rng);
-  return { x, position.y() + NOISE * gaussian(rng) };
-}
 
 /** Matches of points 1.5 to 6 m away from the reference camera. */
 void addMatches(const PlanarPose& reference_in_current, int count, Rng& rng, Correspondences& matches)
 {
-  const double c = std::cos(reference_in_current.yaw);
-  const double s = std::sin(reference_in_current.yaw);
   for (int added = 0; added < count;)
   {
     const Eigen::Vector2d reference = randomPosition(rng);
     const Eigen::Vector3d p = uniform(rng, 1.5, 6.0) * reference.homogeneous();
-    const Eigen::Vector3d current(c * p.x() - s * p.z() - reference_in_current.y, p.y(),
-                                  s * p.x() + c * p.z() + reference_in_current.x);
+    const Eigen::Vector3d current = inCurrentCamera(p, reference_in_current);
     const Eigen::Vector2d position = current.hnormalized();
-    if (current.z() > 0.2 && std::abs(position.x()) < 0.615 && std::abs(position.y()) < 0.46)
+    if (current.z() > 0.2 && inImage(position))
     {
       matches.push_back({ noisy(reference, rng), noisy(position, rng) });
       ++added;
@@ -328,7 +317,7 @@ TEST(HeadingHypotheses, KeepNoMoreThanAsked)
   EXPECT_TRUE(hypotheses.list().empty());
 }
 
-TEST(HeadingHypotheses, SameSeedSameHypotheses)
+TEST(HeadingHypotheses, SameSeedGivesTheSameHypotheses)
 {
   const auto run = [](std::uint64_t seed) {
     const RepeatedScene scene;

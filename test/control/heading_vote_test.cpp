@@ -2,7 +2,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "view_servo/control/heading_vote.h"
 
-#include "support/synthetic_scene.h"
+#include "support/level_matches.h"
 #include "view_servo/geometry/planar_pose.h"
 
 #include <gtest/gtest.h>
@@ -22,7 +22,6 @@ namespace view_servo
 {
 namespace
 {
-constexpr double FOCAL_LENGTH = 520.0;  // [px]
 constexpr double DEGREE = M_PI / 180.0;
 constexpr double BIN = M_PI / 180.0;  // of the default parameters
 
@@ -32,33 +31,22 @@ constexpr double BIN = M_PI / 180.0;  // of the default parameters
  */
 HeadingEvidence evidenceOf(const PlanarPose& reference_in_current, int inliers, int outliers, Rng& rng)
 {
-  const auto random_position = [&rng] {
-    const double x = uniform(rng, -0.615, 0.615);
-    return Eigen::Vector2d(x, uniform(rng, -0.46, 0.46));
-  };
-  const auto with_noise = [&rng](const Eigen::Vector2d& position) {
-    const double x = position.x() + 0.5 / FOCAL_LENGTH * gaussian(rng);
-    return Eigen::Vector2d(x, position.y() + 0.5 / FOCAL_LENGTH * gaussian(rng));
-  };
-  const double c = std::cos(reference_in_current.yaw);
-  const double s = std::sin(reference_in_current.yaw);
   HeadingEvidence evidence;
   while (static_cast<int>(evidence.pairs.size()) < inliers)
   {
-    const Eigen::Vector2d reference = random_position();
+    const Eigen::Vector2d reference = test::randomPosition(rng);
     const Eigen::Vector3d p = uniform(rng, 1.5, 6.0) * reference.homogeneous();
-    const Eigen::Vector3d current(c * p.x() - s * p.z() - reference_in_current.y, p.y(),
-                                  s * p.x() + c * p.z() + reference_in_current.x);
+    const Eigen::Vector3d current = test::inCurrentCamera(p, reference_in_current);
     if (current.z() > 0.3)
     {
-      const Eigen::Vector2d seen = with_noise(reference);
-      evidence.pairs.push_back({ seen, with_noise(current.hnormalized()) });
+      const Eigen::Vector2d seen = test::noisy(reference, rng);
+      evidence.pairs.push_back({ seen, test::noisy(current.hnormalized(), rng) });
     }
   }
   for (int i = 0; i < outliers; ++i)
   {
-    const Eigen::Vector2d reference = random_position();
-    evidence.pairs.push_back({ reference, random_position() });
+    const Eigen::Vector2d reference = test::randomPosition(rng);
+    evidence.pairs.push_back({ reference, test::randomPosition(rng) });
   }
   evidence.weights.assign(evidence.pairs.size(), 1.0);
   return evidence;

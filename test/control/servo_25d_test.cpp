@@ -2,6 +2,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "view_servo/control/servo_25d.h"
 
+#include "support/cameras.h"
 #include "support/synthetic_scene.h"
 
 #include <gtest/gtest.h>
@@ -27,16 +28,11 @@ constexpr double WIDTH = 640.0;
 constexpr double HEIGHT = 480.0;
 constexpr double DISTANCE = 0.5;  // [m]
 
-Eigen::Matrix3d cameraMatrix()
-{
-  Eigen::Matrix3d k;
-  k << 600.0, 0.0, 319.5, 0.0, 600.0, 239.5, 0.0, 0.0, 1.0;
-  return k;
-}
+const Eigen::Matrix3d K = test::cameraMatrix(600.0, 600.0, 319.5, 239.5);
 
 ServoTarget target()
 {
-  return { cameraMatrix(), { WIDTH, HEIGHT }, { 319.5, 239.5 } };
+  return { K, { WIDTH, HEIGHT }, { 319.5, 239.5 } };
 }
 
 /** The camera's frame after it has moved by a twist of its own, by small steps. */
@@ -77,8 +73,8 @@ public:
   }
   Eigen::Vector2d point() const
   {
-    const Eigen::Vector3d chosen = cameraMatrix().inverse() * target().point.homogeneous();
-    return (cameraMatrix() * motion().matrix() * chosen).hnormalized();
+    const Eigen::Vector3d chosen = K.inverse() * target().point.homogeneous();
+    return (K * motion().matrix() * chosen).hnormalized();
   }
   double rotationLeft() const
   {
@@ -148,7 +144,7 @@ Eigen::Isometry3d randomCamera(Rng& rng, const Eigen::Vector3d& normal)
     const double depth = uniform(rng, 0.6, 1.8) * DISTANCE;
     const double u = uniform(rng, 0.15, 0.85) * WIDTH;
     const double v = uniform(rng, 0.15, 0.85) * HEIGHT;
-    const Eigen::Vector3d in_camera = depth * (cameraMatrix().inverse() * Eigen::Vector3d(u, v, 1.0));
+    const Eigen::Vector3d in_camera = depth * (K.inverse() * Eigen::Vector3d(u, v, 1.0));
     const Eigen::Vector3d in_view = DISTANCE / normal.z() * Eigen::Vector3d::UnitZ();
     Eigen::Isometry3d camera = Eigen::Isometry3d::Identity();
     camera.linear() = rotation;

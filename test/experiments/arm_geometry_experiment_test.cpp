@@ -47,7 +47,7 @@ Eigen::Matrix3d turn(double x, double y, double z)
 }
 
 /** A camera over a board on a table, in a folder laid out like the real data; every number is exact. */
-class ArmGeometryExperiment : public ::testing::Test
+class ArmGeometryExperimentTest : public ::testing::Test
 {
 protected:
   void SetUp() override
@@ -127,7 +127,7 @@ protected:
 
 }  // namespace
 
-TEST_F(ArmGeometryExperiment, ExactCornersAgreeWithTheArm)
+TEST_F(ArmGeometryExperimentTest, ExactCornersAgreeWithTheArm)
 {
   const std::vector<Row> rows = run();
   // For the lens as it is given and as the board tells of it.
@@ -156,7 +156,7 @@ TEST_F(ArmGeometryExperiment, ExactCornersAgreeWithTheArm)
   EXPECT_GT(ambiguous, 5);
 }
 
-TEST_F(ArmGeometryExperiment, AWrongJointIsTold)
+TEST_F(ArmGeometryExperimentTest, AWrongJointIsTold)
 {
   // The hand is turned by 3 degrees and 2 cm away from where it says.
   writePose(1, hands_[1] * pose({ 0.02, 0.0, 0.0 }, turn(0.0, 3.0, 0.0)));
@@ -177,7 +177,7 @@ TEST_F(ArmGeometryExperiment, AWrongJointIsTold)
   }
 }
 
-TEST_F(ArmGeometryExperiment, TheBoardTellsOfTheLens)
+TEST_F(ArmGeometryExperimentTest, TheBoardTellsOfTheLens)
 {
   writeCorners(0.2);
   double given = 0.0;
@@ -196,7 +196,7 @@ TEST_F(ArmGeometryExperiment, TheBoardTellsOfTheLens)
   EXPECT_GT(given, 0.2);
 }
 
-TEST_F(ArmGeometryExperiment, WhatIsMissingIsNamed)
+TEST_F(ArmGeometryExperimentTest, WhatIsMissingIsNamed)
 {
   std::filesystem::remove(folder_ / "franka_pose_rPe_3.yaml");
   try

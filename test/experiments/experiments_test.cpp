@@ -4,16 +4,13 @@
 #include "experiments/experiment_context.h"
 #include "experiments/hypothesis_experiments.h"
 #include "support/csv_table.h"
+#include "support/program_run.h"
 #include "support/temporary_directory.h"
 #include "test_paths.h"
 
 #include <gtest/gtest.h>
 
-#include <sys/wait.h>
-
 #include <cstdint>
-#include <cstdlib>
-#include <fstream>
 #include <iterator>
 #include <optional>
 #include <sstream>
@@ -24,24 +21,15 @@ namespace view_servo
 {
 namespace
 {
-struct Outcome
-{
-  int status;
-  std::string out;
-  std::string err;
-};
+using test::ProgramRun;
 
-Outcome run(const std::string& arguments)
+/** @param arguments words with blanks between them. */
+ProgramRun run(const std::string& arguments)
 {
-  const test::TemporaryDirectory directory;
-  const std::string folder = directory.path();
-  const std::string command = "cd '" + folder + "'; '" EXPERIMENTS_PATH "' " + arguments + " > out 2> err < /dev/null";
-  const int status = std::system(command.c_str());
-  const auto text_of = [&](const std::string& name) -> std::string {
-    std::ifstream stream(folder + "/" + name);
-    return { std::istreambuf_iterator<char>(stream), {} };
-  };
-  return { WIFEXITED(status) ? WEXITSTATUS(status) : -1, text_of("out"), text_of("err") };
+  const test::TemporaryDirectory directory;  // the program writes into the one where it runs
+  std::istringstream words(arguments);
+  const std::vector<std::string> each{ std::istream_iterator<std::string>(words), {} };
+  return test::runProgram(EXPERIMENTS_PATH, each, "cd '" + directory.path().string() + "'");
 }
 
 void expectContains(const std::string& text, const std::string& part)
@@ -53,7 +41,7 @@ void expectContains(const std::string& text, const std::string& part)
 
 TEST(Experiments, ListSaysWhatIsRepeatedAndFromWhichSeed)
 {
-  const Outcome outcome = run("--list");
+  const ProgramRun outcome = run("--list");
   EXPECT_EQ(outcome.status, 0);
   expectContains(outcome.out,
                  "homing: chapter 5: homing in simulated rooms, from many starts; --runs 100 (random starts); "
@@ -66,7 +54,7 @@ TEST(Experiments, RefusesRunsWhereNothingIsRepeated)
 {
   for (const std::string name : { "lines_table", "arm_geometry", "homing_directions" })
   {
-    const Outcome outcome = run(name + " --runs 3");
+    const ProgramRun outcome = run(name + " --runs 3");
     EXPECT_EQ(outcome.status, 2);
     expectContains(outcome.err, "--runs: " + name + " repeats nothing");
     expectContains(
@@ -80,7 +68,7 @@ TEST(Experiments, RefusesASeedWhereNothingIsDrawn)
 {
   for (const std::string name : { "lines_table", "arm_geometry" })
   {
-    const Outcome outcome = run(name + " --seed 3");
+    const ProgramRun outcome = run(name + " --seed 3");
     EXPECT_EQ(outcome.status, 2);
     expectContains(outcome.err, "--seed: " + name + " draws no random numbers");
     expectContains(outcome.err, "homing_directions");
@@ -91,13 +79,13 @@ TEST(Experiments, RefusesNumbersOutOfRange)
 {
   for (const std::string value : { "0", "-1", "1.5", "x", "" })
   {
-    const Outcome outcome = run("homing --runs " + value);
+    const ProgramRun outcome = run("homing --runs " + value);
     EXPECT_NE(outcome.status, 0) << value;
     expectContains(outcome.err, "--runs");
   }
   for (const std::string value : { "-1", "1.5", "x", "" })
   {
-    const Outcome outcome = run("homing --seed " + value);
+    const ProgramRun outcome = run("homing --seed " + value);
     EXPECT_NE(outcome.status, 0) << value;
     expectContains(outcome.err, "--seed");
   }
@@ -105,7 +93,7 @@ TEST(Experiments, RefusesNumbersOutOfRange)
 
 TEST(Experiments, SaysSeedAndRuns)
 {
-  const Outcome outcome = run("multi_hypothesis --short --runs 1 --seed 7");
+  const ProgramRun outcome = run("multi_hypothesis --short --runs 1 --seed 7");
   expectContains(outcome.out, "multi_hypothesis: seed 7, 1 scenes\n");
   expectContains(run("multi_hypothesis --short --runs 1").out, "multi_hypothesis: seed 1, 1 scenes\n");
 }

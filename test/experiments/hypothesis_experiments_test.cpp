@@ -2,17 +2,12 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "experiments/hypothesis_experiments.h"
 
-#include "experiments/point_pairs.h"
-#include "sim/textures.h"
+#include "rendered_pairs.h"
 #include "support/csv_table.h"
 #include "support/temporary_directory.h"
 
 #include <gtest/gtest.h>
-#include <opencv2/imgcodecs.hpp>
 
-#include <filesystem>
-#include <fstream>
-#include <iomanip>
 #include <sstream>
 #include <stdexcept>
 #include <string>
@@ -71,19 +66,7 @@ TEST(MultiHypothesisExperiment, TellsTheAlgorithmsApartAsTheThesisDoes)
 TEST(RealPairsExperiment, FindsTheGeometryOfRenderedPairs)
 {
   const test::TemporaryDirectory folder;
-  const std::filesystem::path kusvod = std::filesystem::path(folder.path()) / "kusvod2";
-  std::filesystem::create_directories(kusvod);
-  const PointPair cylinder =
-      renderPair(Surface::CYLINDER, sim::drawTexture("poster", cv::Size(2500, 560), 128.0, 20, 5), 0.7, 1);
-  cv::imwrite((kusvod / "bookshA.png").string(), cylinder.reference);
-  cv::imwrite((kusvod / "bookshB.png").string(), cylinder.current);
-  std::ofstream points(kusvod / "booksh_vpts.txt");
-  points << std::setprecision(17);
-  for (std::size_t i = 0; i < cylinder.points.size(); i += 7)
-  {
-    points << cylinder.points[i].reference.transpose() << ' ' << cylinder.points[i].current.transpose() << '\n';
-  }
-  points.close();
+  test::writeKusvodPair(folder.path() / "kusvod2", "booksh", test::renderedCylinder());
 
   ExperimentContext context;
   context.data = folder.path();

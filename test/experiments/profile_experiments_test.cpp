@@ -4,7 +4,7 @@
 
 #include "experiments/cyclic_order_experiment.h"
 #include "experiments/point_pairs.h"
-#include "sim/textures.h"
+#include "rendered_pairs.h"
 #include "support/csv_table.h"
 #include "support/temporary_directory.h"
 #include "view_servo/geometry/homography.h"
@@ -29,23 +29,10 @@ namespace
 {
 using test::number;
 using test::readTable;
+using test::renderedCylinder;
+using test::renderedPlane;
 using test::Row;
 using test::sum;
-
-cv::Mat picture(const cv::Size& size)
-{
-  return sim::drawTexture("poster", size, 128.0, 20, 5);
-}
-
-PointPair renderedPlane()
-{
-  return renderPair(Surface::PLANE, picture(cv::Size(900, 720)), 0.9, 1);
-}
-
-PointPair renderedCylinder()
-{
-  return renderPair(Surface::CYLINDER, picture(cv::Size(2500, 560)), 0.7, 1);
-}
 
 /** Brightness around a point, of an image that was blurred. */
 double brightness(const cv::Mat& image, const Eigen::Vector2d& point)
@@ -118,15 +105,13 @@ TEST(PointPairs, MissingDataAreNamed)
 }
 
 /** A folder laid out like the real data, with rendered views in it. */
-class OnRenderedData : public ::testing::Test
+class ProfileExperimentsTest : public ::testing::Test
 {
 protected:
   void SetUp() override
   {
     const std::filesystem::path oxford = folder_.path() / "oxford_affine" / "graf";
-    const std::filesystem::path kusvod = folder_.path() / "kusvod2";
     std::filesystem::create_directories(oxford);
-    std::filesystem::create_directories(kusvod);
     const PointPair plane = renderedPlane();
     cv::imwrite((oxford / "img1.png").string(), plane.reference);
     cv::imwrite((oxford / "img3.png").string(), plane.current);
@@ -136,14 +121,7 @@ protected:
     const PointPair cylinder = renderedCylinder();
     for (const std::string name : { "booksh", "wash" })
     {
-      cv::imwrite((kusvod / (name + "A.png")).string(), cylinder.reference);
-      cv::imwrite((kusvod / (name + "B.png")).string(), cylinder.current);
-      std::ofstream points(kusvod / (name + "_vpts.txt"));
-      points << std::setprecision(17);
-      for (std::size_t i = 0; i < cylinder.points.size(); i += 7)
-      {
-        points << cylinder.points[i].reference.transpose() << ' ' << cylinder.points[i].current.transpose() << '\n';
-      }
+      test::writeKusvodPair(folder_.path() / "kusvod2", name, cylinder);
     }
     context_.data = folder_.path();
     context_.brief = true;
@@ -153,7 +131,7 @@ protected:
   ExperimentContext context_;
 };
 
-TEST_F(OnRenderedData, ParametersOfProfiles)
+TEST_F(ProfileExperimentsTest, MoreFeaturesFindMore)
 {
   std::ostringstream csv;
   runProfileParametersExperiment(context_, csv);
@@ -178,7 +156,7 @@ TEST_F(OnRenderedData, ParametersOfProfiles)
   EXPECT_GT(correct("8", "Kv", "50"), 100.0);
 }
 
-TEST_F(OnRenderedData, ViewConsistency)
+TEST_F(ProfileExperimentsTest, ViewConsistencyKeepsMoreThatIsCorrect)
 {
   std::ostringstream csv;
   runViewConsistencyExperiment(context_, csv);

@@ -132,14 +132,14 @@ TEST(Profiles, WithoutContrastSayNothing)
   EXPECT_FALSE(profileFeatures(texturedPicture(1), { 10.0, 10.0 }, { 479.5, 50.0 }, ProfileParams(), features));
 }
 
-class ProfileSets : public ::testing::Test
+class ProfileSetsTest : public ::testing::Test
 {
 protected:
   cv::Mat picture_ = texturedPicture(4);
   std::vector<Corner> corners_ = view_servo::detectCorners(picture_, view_servo::CornerParams());
 };
 
-TEST_F(ProfileSets, HoldEachPairOnceWithinTheLimits)
+TEST_F(ProfileSetsTest, HoldEachPairOnceWithinTheLimits)
 {
   ProfileParams params;
   params.neighbours = 20;
@@ -174,7 +174,7 @@ TEST_F(ProfileSets, HoldEachPairOnceWithinTheLimits)
   EXPECT_GT(radius.pairs.size(), within * 9 / 10);  // all but those without contrast
 }
 
-TEST_F(ProfileSets, PairEachCornerWithAllOfItsNearest)
+TEST_F(ProfileSetsTest, PairEachCornerWithAllOfItsNearest)
 {
   const cv::Mat noisy = view_servo::test::disturbed(picture_, 1.0, 0.0, 3.0);  // nothing is without contrast
   std::vector<Corner> corners = corners_;
@@ -212,7 +212,7 @@ TEST_F(ProfileSets, PairEachCornerWithAllOfItsNearest)
   }
 }
 
-TEST_F(ProfileSets, HaveUnitDeviationAndZeroMean)
+TEST_F(ProfileSetsTest, HaveUnitDeviationAndZeroMean)
 {
   for (const int coefficients : { 4, 6, 8 })
   {

@@ -1,5 +1,6 @@
 // Copyright (c) 2026, the view_servo authors
 // SPDX-License-Identifier: BSD-3-Clause
+#include "support/text_file.h"
 #include "test_paths.h"
 
 #include <gtest/gtest.h>
@@ -7,8 +8,6 @@
 #include <cstddef>
 #include <cstdint>
 #include <filesystem>
-#include <fstream>
-#include <iterator>
 #include <string>
 #include <vector>
 
@@ -39,20 +38,19 @@ void PrintTo(const Target& target, std::ostream* stream)
   *stream << target.name;
 }
 
-class FuzzSeeds : public ::testing::TestWithParam<Target>
+class FuzzSeedsTest : public ::testing::TestWithParam<Target>
 {
 };
 
 /** The seeds, and what broke a reader once; each also cut short at every eighth of its length. */
-TEST_P(FuzzSeeds, AreReadOrRefusedWithAReason)
+TEST_P(FuzzSeedsTest, AreReadOrRefusedWithAReason)
 {
   constexpr std::size_t CUTS = 8;
   std::size_t count = 0;
   for (const auto& entry : std::filesystem::directory_iterator(PACKAGE_DIR "/fuzz/seeds/" + GetParam().name))
   {
     SCOPED_TRACE(entry.path().string());
-    std::ifstream file(entry.path(), std::ios::binary);
-    const std::vector<char> bytes{ std::istreambuf_iterator<char>(file), {} };
+    const std::string bytes = view_servo::test::readText(entry.path());
     ASSERT_FALSE(bytes.empty());
     for (std::size_t cut = 0; cut <= CUTS; ++cut)
     {
@@ -64,7 +62,7 @@ TEST_P(FuzzSeeds, AreReadOrRefusedWithAReason)
   EXPECT_GE(count, 1U);
 }
 
-INSTANTIATE_TEST_SUITE_P(Readers, FuzzSeeds,
+INSTANTIATE_TEST_SUITE_P(Readers, FuzzSeedsTest,
                          ::testing::Values(Target{ "camera_info", fuzzCameraInfo }, Target{ "cameras", fuzzCameras },
                                            Target{ "images", fuzzImages }, Target{ "segments", fuzzSegments },
                                            Target{ "structure", fuzzStructure }, Target{ "views", fuzzViews },

@@ -2,6 +2,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "view_servo/geometry/camera.h"
 
+#include "support/cameras.h"
+
 #include <gtest/gtest.h>
 #include <Eigen/Geometry>
 
@@ -14,11 +16,7 @@ namespace
 {
 Camera pinhole()
 {
-  Camera camera;
-  camera.width = 640;
-  camera.height = 480;
-  camera.k << 520.0, 0.0, 318.5, 0.0, 510.0, 242.25, 0.0, 0.0, 1.0;
-  return camera;
+  return view_servo::test::pinholeCamera({ 640, 480 }, 520.0, 510.0, 318.5, 242.25);
 }
 
 Camera plumbBob()

@@ -2,6 +2,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "view_servo/geometry/camera_warp.h"
 
+#include "support/cameras.h"
+
 #include <gtest/gtest.h>
 #include <Eigen/Geometry>
 #include <opencv2/core.hpp>
@@ -15,11 +17,7 @@ namespace
 {
 Camera pinhole()
 {
-  Camera camera;
-  camera.width = 640;
-  camera.height = 480;
-  camera.k << 500.0, 0.0, 320.0, 0.0, 500.0, 240.0, 0.0, 0.0, 1.0;
-  return camera;
+  return test::pinholeCamera({ 640, 480 }, 500.0, 500.0, 320.0, 240.0);
 }
 
 Camera barrel(double k1)
@@ -42,10 +40,7 @@ Camera fisheye()
 
 Camera large()
 {
-  Camera camera;
-  camera.width = 860;
-  camera.height = 480;
-  camera.k << 670.0, 0.0, 423.0, 0.0, 663.0, 235.0, 0.0, 0.0, 1.0;
+  Camera camera = test::pinholeCamera({ 860, 480 }, 670.0, 663.0, 423.0, 235.0);
   camera.distortion_model = "rational_polynomial";
   camera.distortion = { 0.2, -0.1, 0.0005, -0.0003, 0.01, 0.3, -0.08, 0.0 };
   return camera;

@@ -20,16 +20,6 @@ namespace
 {
 constexpr double NOT_A_NUMBER = std::numeric_limits<double>::quiet_NaN();
 
-test::Scene makeScene(int points, double noise, std::uint64_t seed, bool planar = false)
-{
-  Rng rng(seed);
-  test::SceneOptions options;
-  options.inliers = points;
-  options.noise = noise;
-  options.planar = planar;
-  return test::makeScene(options, rng);
-}
-
 double totalError(const Eigen::Matrix3d& f, const Correspondences& pairs)
 {
   double sum = 0.0;
@@ -86,7 +76,7 @@ TEST(SampsonError, OfASidewaysTranslationIsHalfTheSquaredRowDifference)
 
 TEST(SampsonError, IsTheSquareOfTheResidual)
 {
-  const test::Scene scene = makeScene(50, 3.0, 1);
+  const test::Scene scene = test::makeScene(50, 3.0, 1);
   for (const Correspondence& pair : scene.pairs)
   {
     Eigen::Matrix<double, 1, 9> jacobian;
@@ -98,7 +88,7 @@ TEST(SampsonError, IsTheSquareOfTheResidual)
 TEST(SampsonError, ApproximatesTheDistanceToAnExactPair)
 {
   // Moving a current point off its epipolar line by s costs at most s (the reference point may share the correction).
-  const test::Scene scene = makeScene(50, 0.0, 2);
+  const test::Scene scene = test::makeScene(50, 0.0, 2);
   for (const Correspondence& exact : scene.pairs)
   {
     const Eigen::Vector3d line = scene.fundamental * exact.reference.homogeneous();
@@ -120,7 +110,7 @@ TEST(SampsonError, InfiniteWhereUndefined)
 
 RC_GTEST_PROP(FundamentalFromSevenPoints, OneOrThreeSolutionsWithTheTruthAmongThem, (std::uint64_t seed))
 {
-  const test::Scene scene = makeScene(7, 0.0, seed);
+  const test::Scene scene = test::makeScene(7, 0.0, seed);
   const auto solutions = fundamentalFromSevenPoints(scene.pairs);
   RC_ASSERT(solutions.size() == 1 || solutions.size() == 3);
   for (const Eigen::Matrix3d& f : solutions)
@@ -139,7 +129,7 @@ TEST(FundamentalFromSevenPoints, UsuallyMeetsTheTruthToEightDigits)
   int exact = 0;
   for (std::uint64_t seed = 0; seed < 200; ++seed)
   {
-    const test::Scene scene = makeScene(7, 0.0, seed);
+    const test::Scene scene = test::makeScene(7, 0.0, seed);
     const auto solutions = fundamentalFromSevenPoints(scene.pairs);
     one += solutions.size() == 1 ? 1 : 0;
     three += solutions.size() == 3 ? 1 : 0;
@@ -168,10 +158,10 @@ TEST(FundamentalFromSevenPoints, FindsASolutionThatIsADirectionOfThePencil)
 
 TEST(FundamentalFromSevenPoints, EmptyWhenThePencilIsNotDetermined)
 {
-  const test::Scene scene = makeScene(8, 0.0, 6);
+  const test::Scene scene = test::makeScene(8, 0.0, 6);
   EXPECT_TRUE(fundamentalFromSevenPoints(scene.pairs).empty());
   EXPECT_TRUE(fundamentalFromSevenPoints({}).empty());
-  EXPECT_TRUE(fundamentalFromSevenPoints(makeScene(7, 0.0, 6, true).pairs).empty());
+  EXPECT_TRUE(fundamentalFromSevenPoints(test::makeScene(7, 0.0, 6, true).pairs).empty());
   EXPECT_TRUE(fundamentalFromSevenPoints(collinear(7)).empty());
   EXPECT_TRUE(fundamentalFromSevenPoints(Correspondences(7, scene.pairs[0])).empty());
   Correspondences twice(scene.pairs.begin(), scene.pairs.begin() + 7);
@@ -184,7 +174,7 @@ TEST(FundamentalFromSevenPoints, EmptyWhenThePencilIsNotDetermined)
 RC_GTEST_PROP(FundamentalFromPoints, ExactDataGiveTheTruth, (std::uint64_t seed))
 {
   const int points = *rc::gen::inRange(12, 60);
-  const test::Scene scene = makeScene(points, 0.0, seed);
+  const test::Scene scene = test::makeScene(points, 0.0, seed);
   const auto f = fundamentalFromPoints(scene.pairs);
   RC_ASSERT(f.has_value());
   RC_ASSERT(std::abs(f->norm() - 1.0) < 1e-12);
@@ -196,7 +186,7 @@ TEST(FundamentalFromPoints, EightPointsSuffice)
 {
   for (std::uint64_t seed = 0; seed < 20; ++seed)
   {
-    const test::Scene scene = makeScene(8, 0.0, seed);
+    const test::Scene scene = test::makeScene(8, 0.0, seed);
     const auto f = fundamentalFromPoints(scene.pairs);
     ASSERT_TRUE(f);
     EXPECT_LT(test::projectiveDistance(*f, scene.fundamental), 1e-6);
@@ -205,15 +195,15 @@ TEST(FundamentalFromPoints, EightPointsSuffice)
 
 TEST(FundamentalFromPoints, EmptyForTooFewOrDegeneratePoints)
 {
-  EXPECT_FALSE(fundamentalFromPoints(makeScene(7, 0.0, 1).pairs));
-  EXPECT_FALSE(fundamentalFromPoints(makeScene(8, 0.0, 1, true).pairs));
-  EXPECT_FALSE(fundamentalFromPoints(makeScene(100, 0.0, 2, true).pairs));
+  EXPECT_FALSE(fundamentalFromPoints(test::makeScene(7, 0.0, 1).pairs));
+  EXPECT_FALSE(fundamentalFromPoints(test::makeScene(8, 0.0, 1, true).pairs));
+  EXPECT_FALSE(fundamentalFromPoints(test::makeScene(100, 0.0, 2, true).pairs));
   EXPECT_FALSE(fundamentalFromPoints(collinear(20)));
-  EXPECT_FALSE(fundamentalFromPoints(Correspondences(20, makeScene(1, 0.0, 1).pairs[0])));
-  Correspondences repeated = makeScene(7, 0.0, 3).pairs;
+  EXPECT_FALSE(fundamentalFromPoints(Correspondences(20, test::makeScene(1, 0.0, 1).pairs[0])));
+  Correspondences repeated = test::makeScene(7, 0.0, 3).pairs;
   repeated.insert(repeated.end(), repeated.begin(), repeated.end());
   EXPECT_FALSE(fundamentalFromPoints(repeated));
-  Correspondences invalid = makeScene(20, 0.0, 3).pairs;
+  Correspondences invalid = test::makeScene(20, 0.0, 3).pairs;
   invalid[4].reference.y() = NOT_A_NUMBER;
   EXPECT_FALSE(fundamentalFromPoints(invalid));
 }
@@ -221,7 +211,7 @@ TEST(FundamentalFromPoints, EmptyForTooFewOrDegeneratePoints)
 RC_GTEST_PROP(SampsonResidual, JacobianMatchesNumericOne, (std::uint64_t seed))
 {
   constexpr double STEP = 1e-6;
-  const test::Scene scene = makeScene(1, 5.0, seed);
+  const test::Scene scene = test::makeScene(1, 5.0, seed);
   const Normalization unit{ { 320.0, 240.0 }, 0.005 };
   const Correspondence pair = { unit(scene.pairs[0].reference), unit(scene.pairs[0].current) };
   const Eigen::Matrix3d f = (unit.inverseMatrix().transpose() * scene.fundamental * unit.inverseMatrix()).normalized();
@@ -241,7 +231,7 @@ RC_GTEST_PROP(SampsonResidual, JacobianMatchesNumericOne, (std::uint64_t seed))
 
 RC_GTEST_PROP(Orthonormal, RepresentsAnyMatrixOfRankTwo, (std::uint64_t seed))
 {
-  const test::Scene scene = makeScene(1, 0.0, seed);
+  const test::Scene scene = test::makeScene(1, 0.0, seed);
   const Orthonormal orthonormal(scene.fundamental);
   RC_ASSERT(std::abs(orthonormal.u.determinant() - 1.0) < 1e-12);
   RC_ASSERT(std::abs(orthonormal.v.determinant() - 1.0) < 1e-12);
@@ -272,7 +262,7 @@ TEST(RefineFundamental, LowersTheErrorAndGetsNearTheTruth)
 {
   for (std::uint64_t seed = 0; seed < 20; ++seed)
   {
-    const test::Scene scene = makeScene(100, 1.0, seed);
+    const test::Scene scene = test::makeScene(100, 1.0, seed);
     const auto linear = fundamentalFromPoints(scene.pairs);
     ASSERT_TRUE(linear);
     const Eigen::Matrix3d refined = refineFundamental(*linear, scene.pairs);
@@ -288,7 +278,7 @@ TEST(RefineFundamental, LowersTheErrorAndGetsNearTheTruth)
 TEST(RefineFundamental, NoNearbyMatrixOfRankTwoIsBetter)
 {
   Rng rng(12);
-  const test::Scene scene = makeScene(60, 1.0, 12);
+  const test::Scene scene = test::makeScene(60, 1.0, 12);
   const Eigen::Matrix3d refined =
       refineFundamental(*fundamentalFromPoints(scene.pairs), scene.pairs, std::numeric_limits<double>::infinity(), 100);
   const double error = totalError(refined, scene.pairs);
@@ -305,7 +295,7 @@ TEST(RefineFundamental, NoNearbyMatrixOfRankTwoIsBetter)
 
 TEST(RefineFundamental, HuberWidthResistsOutliers)
 {
-  test::Scene scene = makeScene(100, 0.5, 13);
+  test::Scene scene = test::makeScene(100, 0.5, 13);
   for (int i = 0; i < 10; ++i)
   {
     const Eigen::Vector3d line = scene.fundamental * scene.pairs[i].reference.homogeneous();
@@ -319,7 +309,7 @@ TEST(RefineFundamental, HuberWidthResistsOutliers)
 
 TEST(RefineFundamental, InvalidPairsAreLeftOut)
 {
-  const test::Scene scene = makeScene(50, 0.5, 14);
+  const test::Scene scene = test::makeScene(50, 0.5, 14);
   const Eigen::Matrix3d linear = *fundamentalFromPoints(scene.pairs);
   Correspondences pairs = scene.pairs;
   pairs.push_back({ { 10, NOT_A_NUMBER }, { 3, 4 } });
@@ -328,7 +318,7 @@ TEST(RefineFundamental, InvalidPairsAreLeftOut)
 
 TEST(RefineFundamental, ReturnsTheInitialWhenItCannotBeImproved)
 {
-  const test::Scene scene = makeScene(20, 0.5, 15);
+  const test::Scene scene = test::makeScene(20, 0.5, 15);
   const Eigen::Matrix3d initial = 2.0 * scene.fundamental;
   EXPECT_EQ(refineFundamental(initial, {}), initial);
   EXPECT_EQ(refineFundamental(initial, { scene.pairs.begin(), scene.pairs.begin() + 6 }), initial);
@@ -338,7 +328,7 @@ TEST(RefineFundamental, ReturnsTheInitialWhenItCannotBeImproved)
 
 RC_GTEST_PROP(Epipoles, AreTheOtherCamerasCentre, (std::uint64_t seed))
 {
-  const test::Scene scene = makeScene(1, 0.0, seed);
+  const test::Scene scene = test::makeScene(1, 0.0, seed);
   const Eigen::Vector3d current = (scene.k * scene.t).normalized();
   const Eigen::Vector3d reference = (scene.k * scene.r.transpose() * scene.t).normalized();
   RC_ASSERT(currentEpipole(scene.fundamental).cross(current).norm() < 1e-9);

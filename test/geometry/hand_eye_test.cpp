@@ -2,6 +2,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "view_servo/geometry/hand_eye.h"
 
+#include "support/cameras.h"
 #include "view_servo/geometry/homography.h"
 #include "view_servo/geometry/rotation_vector.h"
 #include "view_servo/robust/random.h"
@@ -62,7 +63,7 @@ struct Scene
 
   explicit Scene(std::uint64_t seed) : rng(seed)
   {
-    view.k << 600.0, 0.0, 320.0, 0.0, 610.0, 240.0, 0.0, 0.0, 1.0;
+    view.k = test::cameraMatrix(600.0, 610.0, 320.0, 240.0);
     view.corners = { { 180.0, 90.0 }, { 470.0, 90.0 }, { 470.0, 400.0 }, { 180.0, 400.0 } };
     camera_in_flange = pose(uniformVector(rng, 0.15), uniformVector(rng, 2.0));
     view_in_base = pose(uniformVector(rng, 0.6), uniformVector(rng, 2.0));

@@ -49,12 +49,7 @@ double rmsDistance(const Eigen::Matrix3d& a, const Eigen::Matrix3d& b)
 
 test::Scene planarScene(int points, double noise, std::uint64_t seed)
 {
-  Rng rng(seed);
-  test::SceneOptions options;
-  options.inliers = points;
-  options.noise = noise;
-  options.planar = true;
-  return test::makeScene(options, rng);
+  return test::makeScene(points, noise, seed, true);
 }
 
 /** A well-spread sample: the corners of a rectangle, moved. */

@@ -2,6 +2,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "view_servo/geometry/line_homography.h"
 
+#include "support/corner_error.h"
 #include "support/synthetic_scene.h"
 #include "view_servo/robust/line_homography_estimator.h"
 #include "view_servo/robust/ransac.h"
@@ -19,8 +20,7 @@ namespace view_servo
 {
 namespace
 {
-
-Eigen::Matrix3d exampleHomography()
+Eigen::Matrix3d rolledHomography()
 {
   Eigen::Matrix3d h;
   h << 0.8, -0.3, 90.0, 0.25, 0.9, -20.0, 3e-4, -2e-4, 1.0;
@@ -53,16 +53,10 @@ SegmentPairs randomPairs(std::mt19937_64& rng, const Eigen::Matrix3d& h, int cou
   return pairs;
 }
 
-/** Largest difference of where two homographies send the corners of a 640x480 image [px]. */
+/** In a 640x480 image [px]. */
 double difference(const Eigen::Matrix3d& a, const Eigen::Matrix3d& b)
 {
-  double largest = 0.0;
-  for (const Eigen::Vector2d& corner : { Eigen::Vector2d(0, 0), { 639, 0 }, { 0, 479 }, { 639, 479 } })
-  {
-    largest =
-        std::max(largest, ((a * corner.homogeneous()).hnormalized() - (b * corner.homogeneous()).hnormalized()).norm());
-  }
-  return largest;
+  return test::largestCornerError(a, b, { 640, 480 });
 }
 
 }  // namespace
@@ -74,9 +68,9 @@ TEST(LineHomography, IsExactWhateverPartsOfTheLinesAreSeen)
   {
     for (int round = 0; round < 20; ++round)
     {
-      const auto found = homographyFromLines(randomPairs(rng, exampleHomography(), count));
+      const auto found = homographyFromLines(randomPairs(rng, rolledHomography(), count));
       ASSERT_TRUE(found.has_value());
-      EXPECT_LT(difference(*found, exampleHomography()), 1e-3) << count << " lines";
+      EXPECT_LT(difference(*found, rolledHomography()), 1e-3) << count << " lines";
     }
   }
 }
@@ -84,7 +78,7 @@ TEST(LineHomography, IsExactWhateverPartsOfTheLinesAreSeen)
 TEST(LineHomography, AffinityOfThreeLinesIsExact)
 {
   std::mt19937_64 rng(2);
-  Eigen::Matrix3d affinity = exampleHomography();
+  Eigen::Matrix3d affinity = rolledHomography();
   affinity.row(2) << 0.0, 0.0, 1.0;
   for (int round = 0; round < 20; ++round)
   {
@@ -98,8 +92,8 @@ TEST(LineHomography, IsEmptyWhenTheLinesLeaveItOpen)
 {
   std::mt19937_64 rng(3);
   EXPECT_FALSE(homographyFromLines({}).has_value());
-  EXPECT_FALSE(homographyFromLines(randomPairs(rng, exampleHomography(), 3)).has_value());
-  EXPECT_FALSE(affinityFromLines(randomPairs(rng, exampleHomography(), 2)).has_value());
+  EXPECT_FALSE(homographyFromLines(randomPairs(rng, rolledHomography(), 3)).has_value());
+  EXPECT_FALSE(affinityFromLines(randomPairs(rng, rolledHomography(), 2)).has_value());
   SegmentPairs parallel;
   SegmentPairs concurrent;
   for (int i = 0; i < 6; ++i)
@@ -175,7 +169,7 @@ TEST(CompareSegments, SaysHowTheyLieToEachOther)
 TEST(LineHomographyEstimator, FindsThePlaneAmongFalseMatches)
 {
   std::mt19937_64 rng(4);
-  SegmentPairs pairs = randomPairs(rng, exampleHomography(), 30);
+  SegmentPairs pairs = randomPairs(rng, rolledHomography(), 30);
   for (int i = 0; i < 40; ++i)
   {
     pairs.push_back({ randomSegment(rng), randomSegment(rng) });
@@ -186,7 +180,7 @@ TEST(LineHomographyEstimator, FindsThePlaneAmongFalseMatches)
   Rng draws(7);
   const auto result = ransac(LineHomographyEstimator(pairs), params, draws);
   ASSERT_TRUE(result.model.has_value());
-  EXPECT_LT(difference(result.model->h, exampleHomography()), 0.1);
+  EXPECT_LT(difference(result.model->h, rolledHomography()), 0.1);
   EXPECT_GE(result.inliers.size(), 30U);
   EXPECT_LE(result.inliers.size(), 32U);
 }

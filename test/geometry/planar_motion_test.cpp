@@ -278,7 +278,7 @@ TEST(InverseDepth, BehindTheCurrentCameraNothingIsKnown)
   EXPECT_EQ(depth.information, 0.0);
 }
 
-TEST(InverseDepth, NoBaselineNoInformation)
+TEST(InverseDepth, HasNoInformationWithoutABaseline)
 {
   const InverseDepth still = inverseDepth({ { 0.2, 0.3 }, { 0.2, 0.3 } }, PlanarPose{ 0.0, 0.0, 0.0 });
   EXPECT_EQ(still.information, 0.0);

@@ -130,7 +130,7 @@ TEST(CameraMount, OfALevelCameraChangesNoPoint)
   EXPECT_TRUE(CameraMount().level({ 0.3, 0.4 }).isApprox(Eigen::Vector2d(0.3, 0.4)));
 }
 
-TEST(CameraMount, HandComputedTilt)
+TEST(CameraMount, TiltIsAsComputedByHand)
 {
   // 30 degrees down: the middle of the image is 30 degrees below the horizon, which is as far above the middle.
   const CameraMount mount(mounted(0.0, 0.0, 0.0, 30.0 * DEGREE, 0.0));
@@ -189,7 +189,7 @@ TEST(CameraMount, RefusesACameraThatLooksAtTheFloor)
   EXPECT_THROW(CameraMount{ nowhere }, std::invalid_argument);
 }
 
-TEST(CameraMount, HandComputedLeverArm)
+TEST(CameraMount, LeverArmIsAsComputedByHand)
 {
   // The camera 0.5 ahead of the base, which turns by 90 degrees to the left on the spot: the camera comes from (0.5, 0)
   // to (0, 0.5).

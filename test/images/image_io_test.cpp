@@ -2,7 +2,10 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "view_servo/images/image_io.h"
 
+#include "support/random_picture.h"
 #include "support/temporary_directory.h"
+#include "support/text_file.h"
+#include "support/thrown_message.h"
 
 #include <gtest/gtest.h>
 #include <opencv2/core.hpp>
@@ -14,46 +17,27 @@
 
 #include <array>
 #include <filesystem>
-#include <fstream>
-#include <iterator>
 #include <utility>
 #include <vector>
 
 using view_servo::ImageError;
 using view_servo::readGreyImage;
 using view_servo::toGrey;
+using view_servo::test::largestDifference;
+using view_servo::test::randomPicture;
+using view_servo::test::readText;
 using view_servo::test::TemporaryDirectory;
+using view_servo::test::thrownMessage;
+using view_servo::test::writeText;
 
 namespace
 {
 cv::Mat randomImage(int type, const cv::Size& size = cv::Size(40, 30))
 {
-  cv::Mat image(size, type);
-  cv::RNG rng(7);
-  rng.fill(image, cv::RNG::UNIFORM, 0, image.depth() == CV_16U ? 65536 : 256);
-  return image;
+  return randomPicture(7, size, type);
 }
 
-/** Largest difference of grey levels. */
-double difference(const cv::Mat& a, const cv::Mat& b)
-{
-  return cv::norm(a, b, cv::NORM_INF);
-}
-
-std::string errorOf(const std::string& path)
-{
-  try
-  {
-    readGreyImage(path);
-  }
-  catch (const ImageError& error)
-  {
-    return error.what();
-  }
-  return "no error";
-}
-
-class ImageIo : public ::testing::Test
+class ImageIoTest : public ::testing::Test
 {
 protected:
   std::string path(const std::string& name) const
@@ -69,22 +53,20 @@ protected:
 
   std::string writeBytes(const std::string& name, const std::string& bytes) const
   {
-    std::ofstream(path(name), std::ios::binary) << bytes;
-    return path(name);
+    return writeText(path(name), bytes);
   }
 
   /** The first `fraction` of a file. */
   std::string cutShort(const std::string& whole, const std::string& name, double fraction) const
   {
-    std::ifstream file(whole, std::ios::binary);
-    const std::string bytes(std::istreambuf_iterator<char>(file), {});
+    const std::string bytes = readText(whole);
     return writeBytes(name, bytes.substr(0, static_cast<std::size_t>(fraction * static_cast<double>(bytes.size()))));
   }
 
   /** One line that names the file and has `reason` in it. */
   static void expectRefused(const std::string& file, const std::string& reason)
   {
-    const std::string error = errorOf(file);
+    const std::string error = thrownMessage<ImageError>([&] { readGreyImage(file); });
     EXPECT_NE(error.find(file), std::string::npos) << error;
     EXPECT_NE(error.find(reason), std::string::npos) << error;
     EXPECT_EQ(error.find('\n'), std::string::npos) << error;
@@ -116,7 +98,7 @@ TEST(ToGrey, IgnoresTransparency)
   const cv::Mat image = randomImage(CV_8UC4);
   cv::Mat opaque;
   cv::cvtColor(image, opaque, cv::COLOR_BGRA2BGR);
-  EXPECT_EQ(difference(toGrey(image, "image"), toGrey(opaque, "image")), 0.0);
+  EXPECT_EQ(largestDifference(toGrey(image, "image"), toGrey(opaque, "image")), 0.0);
 }
 
 TEST(ToGrey, MapsTheWhole16BitRange)
@@ -180,16 +162,16 @@ TEST(ToGrey, RefusesSizesBeyondTheLimits)
   EXPECT_THROW(toGrey(cv::Mat(5001, 10000, CV_8UC1), "image"), ImageError);
 }
 
-TEST_F(ImageIo, ReadsGreyLosslessly)
+TEST_F(ImageIoTest, ReadsGreyLosslessly)
 {
   const cv::Mat image = randomImage(CV_8UC1);
-  EXPECT_EQ(difference(readGreyImage(writeImage("grey.png", image)), image), 0.0);
-  EXPECT_EQ(difference(readGreyImage(writeImage("grey.pgm", image)), image), 0.0);
-  EXPECT_EQ(difference(readGreyImage(writeImage("grey.bmp", image)), image), 0.0);
-  EXPECT_EQ(difference(readGreyImage(writeImage("grey.tiff", image)), image), 0.0);
+  EXPECT_EQ(largestDifference(readGreyImage(writeImage("grey.png", image)), image), 0.0);
+  EXPECT_EQ(largestDifference(readGreyImage(writeImage("grey.pgm", image)), image), 0.0);
+  EXPECT_EQ(largestDifference(readGreyImage(writeImage("grey.bmp", image)), image), 0.0);
+  EXPECT_EQ(largestDifference(readGreyImage(writeImage("grey.tiff", image)), image), 0.0);
 }
 
-TEST_F(ImageIo, ReadsPnmWithComments)
+TEST_F(ImageIoTest, ReadsPnmWithComments)
 {
   const std::string pixels(20 * 16, 'x');
   const cv::Mat image = readGreyImage(writeBytes("a.pgm", "P5\n# made by hand\n20 # wide\n16\n255\n" + pixels));
@@ -197,18 +179,18 @@ TEST_F(ImageIo, ReadsPnmWithComments)
   EXPECT_EQ(image.at<uchar>(0, 0), 'x');
 }
 
-TEST_F(ImageIo, ConvertsWhatItReads)
+TEST_F(ImageIoTest, ConvertsWhatItReads)
 {
   for (const int type : { CV_8UC3, CV_8UC4, CV_16UC1, CV_16UC3, CV_16UC4 })
   {
     const cv::Mat image = randomImage(type);
     const cv::Mat grey = readGreyImage(writeImage("image.png", image));
     EXPECT_EQ(grey.type(), CV_8UC1) << cv::typeToString(type);
-    EXPECT_EQ(difference(grey, toGrey(image, "image")), 0.0) << cv::typeToString(type);
+    EXPECT_EQ(largestDifference(grey, toGrey(image, "image")), 0.0) << cv::typeToString(type);
   }
 }
 
-TEST_F(ImageIo, ReadsGreyWithAlpha)
+TEST_F(ImageIoTest, ReadsGreyWithAlpha)
 {
   // OpenCV writes no such files, so here is one: 16 x 16 pixels of grey 100 and alpha 255.
   static constexpr std::array<unsigned char, 75> png{
@@ -218,26 +200,26 @@ TEST_F(ImageIo, ReadsGreyWithAlpha)
     0x63, 0x10, 0x34, 0x90, 0x4c, 0x6f, 0x00, 0x00, 0x00, 0x00, 0x49, 0x45, 0x4e, 0x44, 0xae, 0x42, 0x60, 0x82
   };
   const cv::Mat grey = readGreyImage(writeBytes("grey_alpha.png", std::string(png.begin(), png.end())));
-  EXPECT_EQ(difference(grey, cv::Mat(16, 16, CV_8UC1, cv::Scalar(100))), 0.0);
+  EXPECT_EQ(largestDifference(grey, cv::Mat(16, 16, CV_8UC1, cv::Scalar(100))), 0.0);
 }
 
-TEST_F(ImageIo, ReadsJpeg)
+TEST_F(ImageIoTest, ReadsJpeg)
 {
   cv::Mat image;
   cv::GaussianBlur(randomImage(CV_8UC3, { 200, 100 }), image, cv::Size(), 4.0);
-  EXPECT_LT(difference(readGreyImage(writeImage("image.jpg", image)), toGrey(image, "image")), 8.0);
+  EXPECT_LT(largestDifference(readGreyImage(writeImage("image.jpg", image)), toGrey(image, "image")), 8.0);
   EXPECT_TRUE(cv::imwrite(path("progressive.jpg"), image, { cv::IMWRITE_JPEG_PROGRESSIVE, 1 }));
-  EXPECT_LT(difference(readGreyImage(path("progressive.jpg")), toGrey(image, "image")), 8.0);
+  EXPECT_LT(largestDifference(readGreyImage(path("progressive.jpg")), toGrey(image, "image")), 8.0);
 }
 
-TEST_F(ImageIo, RefusesWhatIsNotAFile)
+TEST_F(ImageIoTest, RefusesWhatIsNotAFile)
 {
   expectRefused(path("nothing.png"), "No such file");
   expectRefused(path("."), "not a file");
   expectRefused("/dev/zero", "not a file");
 }
 
-TEST_F(ImageIo, RefusesFilesItMayNotRead)
+TEST_F(ImageIoTest, RefusesFilesItMayNotRead)
 {
   if (geteuid() == 0)
   {
@@ -248,7 +230,7 @@ TEST_F(ImageIo, RefusesFilesItMayNotRead)
   expectRefused(file, "ermission denied");
 }
 
-TEST_F(ImageIo, RefusesWhatIsNotAnImage)
+TEST_F(ImageIoTest, RefusesWhatIsNotAnImage)
 {
   expectRefused(writeBytes("empty.png", ""), "not an image");
   expectRefused(writeBytes("text.png", "a b c\n"), "not an image");
@@ -257,7 +239,7 @@ TEST_F(ImageIo, RefusesWhatIsNotAnImage)
   expectRefused(writeBytes("signature.jpg", "\xFF\xD8\xFF"), "not an image");
 }
 
-TEST_F(ImageIo, RefusesImagesCutShort)
+TEST_F(ImageIoTest, RefusesImagesCutShort)
 {
   for (const std::string extension : { ".png", ".jpg", ".pgm" })
   {
@@ -267,18 +249,18 @@ TEST_F(ImageIo, RefusesImagesCutShort)
   }
 }
 
-TEST_F(ImageIo, RefusesFloatImages)
+TEST_F(ImageIoTest, RefusesFloatImages)
 {
   expectRefused(writeImage("float.tiff", cv::Mat(20, 20, CV_32FC1, cv::Scalar(0.5))), "neither 8 nor 16 bits");
 }
 
-TEST_F(ImageIo, RefusesTinyImages)
+TEST_F(ImageIoTest, RefusesTinyImages)
 {
   expectRefused(writeImage("tiny.png", randomImage(CV_8UC1, { 1, 1 })), "1 x 1");
   expectRefused(writeImage("narrow.bmp", randomImage(CV_8UC1, { 200, 2 })), "200 x 2");
 }
 
-TEST_F(ImageIo, RefusesHugeImagesByTheirHeaderAlone)
+TEST_F(ImageIoTest, RefusesHugeImagesByTheirHeaderAlone)
 {
   // Only headers: had anything been decoded, these would be called damaged.
   using namespace std::string_literals;
@@ -290,7 +272,7 @@ TEST_F(ImageIo, RefusesHugeImagesByTheirHeaderAlone)
   expectRefused(writeBytes("overflow.pgm", "P5\n4294967297 4294967297\n255\n"), "over 50 megapixels");
 }
 
-TEST_F(ImageIo, RefusesHugeBmpAndTiffByTheirHeaderAlone)
+TEST_F(ImageIoTest, RefusesHugeBmpAndTiffByTheirHeaderAlone)
 {
   using namespace std::string_literals;
   const std::string bmp = "BM"s + std::string(12, '\0') + "\x28\0\0\0\x10\x27\0\0\xF0\xD8\xFF\xFF"s;  // 10000 x -10000
@@ -304,21 +286,21 @@ TEST_F(ImageIo, RefusesHugeBmpAndTiffByTheirHeaderAlone)
   expectRefused(writeBytes("strips.tif", other_order), "32 x 268435456");
 }
 
-TEST_F(ImageIo, ReadsTiffAndBmp)
+TEST_F(ImageIoTest, ReadsTiffAndBmp)
 {
   const cv::Mat image = randomImage(CV_8UC1);
-  EXPECT_EQ(difference(readGreyImage(writeImage("a.tiff", image)), image), 0.0);
-  EXPECT_EQ(difference(readGreyImage(writeImage("a.bmp", image)), image), 0.0);
+  EXPECT_EQ(largestDifference(readGreyImage(writeImage("a.tiff", image)), image), 0.0);
+  EXPECT_EQ(largestDifference(readGreyImage(writeImage("a.bmp", image)), image), 0.0);
 }
 
-TEST_F(ImageIo, RefusesFormatsThatCannotTellTheirSize)
+TEST_F(ImageIoTest, RefusesFormatsThatCannotTellTheirSize)
 {
   expectRefused(writeBytes("a.pfm", "Pf\n16000 16000\n-1.0\n"), "not an image");
   expectRefused(writeBytes("a.exr", "\x76\x2f\x31\x01 and so on"), "not an image");
   expectRefused(writeImage("a.webp", randomImage(CV_8UC3)), "PNG, JPEG, PNM, BMP and TIFF are read");
 }
 
-TEST_F(ImageIo, DoesNotWaitForAPipe)
+TEST_F(ImageIoTest, DoesNotWaitForAPipe)
 {
   ASSERT_EQ(mkfifo(path("pipe.png").c_str(), 0600), 0);
   expectRefused(path("pipe.png"), "not a file");

@@ -2,6 +2,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "view_servo/images/sampling.h"
 
+#include "support/random_picture.h"
+
 #include <gtest/gtest.h>
 #include <opencv2/core.hpp>
 
@@ -12,20 +14,9 @@
 
 namespace view_servo
 {
-namespace
-{
-cv::Mat randomImage(int rows, int columns)
-{
-  cv::Mat image(rows, columns, CV_8UC1);
-  cv::RNG(1).fill(image, cv::RNG::UNIFORM, 0, 256);
-  return image;
-}
-
-}  // namespace
-
 TEST(BilinearSampler, GivesPixelsAsTheyAre)
 {
-  const cv::Mat image = randomImage(7, 9);
+  const cv::Mat image = test::randomPicture(1, cv::Size(9, 7));
   const BilinearSampler sampler(image);
   for (int v = 0; v < image.rows - 1; ++v)
   {
@@ -50,7 +41,7 @@ TEST(BilinearSampler, InterpolatesBetweenFourPixels)
 
 TEST(BilinearSampler, ReadsAlongALineWhatItReadsAtEachPlace)
 {
-  const cv::Mat image = randomImage(40, 60);
+  const cv::Mat image = test::randomPicture(1, cv::Size(60, 40));
   const BilinearSampler sampler(image(cv::Rect(3, 2, 50, 30)));
   const Eigen::Vector2f first(2.3F, 25.8F);
   const Eigen::Vector2f step(0.7F, -0.41F);
@@ -69,7 +60,7 @@ TEST(BilinearSampler, ReadsAlongALineWhatItReadsAtEachPlace)
 
 TEST(BilinearSampler, ReadsPartsOfImages)
 {
-  const cv::Mat image = randomImage(20, 30);
+  const cv::Mat image = test::randomPicture(1, cv::Size(30, 20));
   const cv::Mat part = image(cv::Rect(5, 3, 10, 8));
   EXPECT_EQ(BilinearSampler(part).at(2.5F, 4.25F), BilinearSampler(image).at(7.5F, 7.25F));
 }

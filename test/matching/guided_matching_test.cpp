@@ -23,7 +23,7 @@ using view_servo::searchAlongHomography;
 using view_servo::test::exampleHomography;
 using view_servo::test::texturedPicture;
 
-class SearchAlongHomography : public ::testing::Test
+class SearchAlongHomographyTest : public ::testing::Test
 {
 protected:
   /** Distances of the matches from the truth [px]. */
@@ -45,7 +45,7 @@ protected:
   std::vector<Corner> corners_ = view_servo::detectCorners(reference_, view_servo::CornerParams());
 };
 
-TEST_F(SearchAlongHomography, FindsCornersToAFractionOfAPixel)
+TEST_F(SearchAlongHomographyTest, FindsCornersToAFractionOfAPixel)
 {
   const std::vector<GuidedMatch> matches =
       searchAlongHomography(reference_, corners_, current_, truth_, 3.0, GuidedParams());
@@ -61,7 +61,7 @@ TEST_F(SearchAlongHomography, FindsCornersToAFractionOfAPixel)
   }
 }
 
-TEST_F(SearchAlongHomography, FindsAPatchWhereItIsItself)
+TEST_F(SearchAlongHomographyTest, FindsAPatchWhereItIsItself)
 {
   std::vector<Corner> corners = corners_;
   for (Corner& corner : corners)
@@ -83,7 +83,7 @@ TEST_F(SearchAlongHomography, FindsAPatchWhereItIsItself)
   }
 }
 
-TEST_F(SearchAlongHomography, CorrectsAPredictionThatIsOff)
+TEST_F(SearchAlongHomographyTest, CorrectsAPredictionThatIsOff)
 {
   Eigen::Matrix3d off = Eigen::Matrix3d::Identity();
   off(0, 2) = 2.4;
@@ -96,7 +96,7 @@ TEST_F(SearchAlongHomography, CorrectsAPredictionThatIsOff)
   EXPECT_LT(found[found.size() / 2], 0.2);
 }
 
-TEST_F(SearchAlongHomography, FindsLittleAlongAWrongOne)
+TEST_F(SearchAlongHomographyTest, FindsLittleAlongAWrongOne)
 {
   Eigen::Matrix3d wrong = truth_;
   wrong(0, 2) += 60.0;
@@ -104,7 +104,7 @@ TEST_F(SearchAlongHomography, FindsLittleAlongAWrongOne)
   EXPECT_LT(found, corners_.size() / 20);
 }
 
-TEST_F(SearchAlongHomography, SurvivesHomographiesThatAreNone)
+TEST_F(SearchAlongHomographyTest, SurvivesHomographiesThatAreNone)
 {
   EXPECT_TRUE(
       searchAlongHomography(reference_, corners_, current_, Eigen::Matrix3d::Zero(), 3.0, GuidedParams()).empty());

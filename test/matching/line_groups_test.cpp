@@ -209,11 +209,11 @@ TEST(TripletKey, IsUniqueOverAllCombinations)
   }
 }
 
-class Groups : public testing::TestWithParam<LineGrouping>
+class LineGroupsTest : public testing::TestWithParam<LineGrouping>
 {
 };
 
-TEST_P(Groups, OfAPlaneSeenFromElsewhereHaveTheSameKeys)
+TEST_P(LineGroupsTest, OfAPlaneSeenFromElsewhereHaveTheSameKeys)
 {
   std::mt19937_64 rng(11);
   LineGroupParams params;
@@ -247,7 +247,7 @@ TEST_P(Groups, OfAPlaneSeenFromElsewhereHaveTheSameKeys)
   }
 }
 
-TEST_P(Groups, VoteForTheTrueCounterpart)
+TEST_P(LineGroupsTest, VoteForTheTrueCounterpart)
 {
   std::mt19937_64 rng(3);
   LineGroupParams params;
@@ -285,7 +285,7 @@ TEST_P(Groups, VoteForTheTrueCounterpart)
   EXPECT_GE(right, GetParam() == LineGrouping::TRIPLETS ? 34 : 10);
 }
 
-INSTANTIATE_TEST_SUITE_P(Both, Groups, testing::Values(LineGrouping::PAIRS, LineGrouping::TRIPLETS));
+INSTANTIATE_TEST_SUITE_P(Both, LineGroupsTest, testing::Values(LineGrouping::PAIRS, LineGrouping::TRIPLETS));
 
 TEST(LineIndex, UprightOrderPairsVerticalsWithOthers)
 {

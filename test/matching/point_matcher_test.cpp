@@ -24,10 +24,10 @@ using view_servo::ProfileIndex;
 using view_servo::test::exampleHomography;
 using view_servo::test::texturedPicture;
 
-class PointMatcher : public ::testing::Test
+class PointMatcherTest : public ::testing::Test
 {
 protected:
-  PointMatcher()
+  PointMatcherTest()
   {
     params_.corners.max_corners = 200;
     params_.profiles.neighbours = 30;
@@ -55,24 +55,24 @@ protected:
   cv::Mat warped_ = view_servo::test::warpedPicture(picture_, exampleHomography(), picture_.size());
 };
 
-TEST_F(PointMatcher, MatchesAnImageWithItself)
+TEST_F(PointMatcherTest, MatchesAnImageWithItself)
 {
   EXPECT_GT(correct(picture_, picture_, Eigen::Matrix3d::Identity()), 0.97);
 }
 
-TEST_F(PointMatcher, MatchesAPlaneSeenFromAnotherSideUnderAnotherLight)
+TEST_F(PointMatcherTest, MatchesAPlaneSeenFromAnotherSideUnderAnotherLight)
 {
   EXPECT_GT(correct(picture_, view_servo::test::disturbed(warped_, 0.8, 10.0, 2.0), exampleHomography()), 0.45);
 }
 
-TEST_F(PointMatcher, CyclicOrderFindsMoreThanVotesAlone)
+TEST_F(PointMatcherTest, CyclicOrderFindsMoreThanVotesAlone)
 {
   const double with = correct(picture_, warped_, exampleHomography());
   params_.cyclic_order = false;
   EXPECT_GT(with, correct(picture_, warped_, exampleHomography()));
 }
 
-TEST_F(PointMatcher, MatchesInAllVariants)
+TEST_F(PointMatcherTest, MatchesInAllVariants)
 {
   for (const auto selection : { view_servo::PairSelection::NEAREST, view_servo::PairSelection::RADIUS })
   {
@@ -102,7 +102,7 @@ TEST_F(PointMatcher, MatchesInAllVariants)
   }
 }
 
-TEST_F(PointMatcher, AVoteWeighsOneOverTheNumberOfSimilarProfiles)
+TEST_F(PointMatcherTest, AVoteWeighsOneOverTheNumberOfSimilarProfiles)
 {
   params_.cyclic_order = false;
   const PointFeatures features = extractPointFeatures(picture_, params_);
@@ -116,7 +116,7 @@ TEST_F(PointMatcher, AVoteWeighsOneOverTheNumberOfSimilarProfiles)
   EXPECT_NEAR(total, 2.0 * static_cast<double>(features.profiles.pairs.size()), 0.01 * total);
 }
 
-TEST_F(PointMatcher, AnAlignmentIsAtMostOneForEachProfileOfACorner)
+TEST_F(PointMatcherTest, AnAlignmentIsAtMostOneForEachProfileOfACorner)
 {
   const PointFeatures features = extractPointFeatures(picture_, params_);
   std::vector<int> degree(features.corners.size(), 0);
@@ -133,7 +133,7 @@ TEST_F(PointMatcher, AnAlignmentIsAtMostOneForEachProfileOfACorner)
   }
 }
 
-TEST_F(PointMatcher, DoesNotDependOnTheNumberOfThreads)
+TEST_F(PointMatcherTest, DoesNotDependOnTheNumberOfThreads)
 {
   const PointFeatures from = extractPointFeatures(picture_, params_);
   const PointFeatures to = extractPointFeatures(warped_, params_);
@@ -151,7 +151,7 @@ TEST_F(PointMatcher, DoesNotDependOnTheNumberOfThreads)
   }
 }
 
-TEST_F(PointMatcher, OfAnEmptySceneFindsNothing)
+TEST_F(PointMatcherTest, OfAnEmptySceneFindsNothing)
 {
   const cv::Mat flat(200, 200, CV_8UC1, cv::Scalar(80));
   const PointFeatures none = extractPointFeatures(flat, params_);

@@ -2,7 +2,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "view_servo/robust/planar_motion_estimator.h"
 
-#include "support/synthetic_scene.h"
+#include "support/level_matches.h"
 #include "view_servo/geometry/fundamental.h"
 #include "view_servo/robust/ransac.h"
 #include "view_servo/robust/significance.h"
@@ -20,42 +20,22 @@ namespace view_servo
 {
 namespace
 {
+using test::FOCAL_LENGTH;
+using test::inImage;
+using test::noisy;
+using test::randomPosition;
+
 constexpr double NOT_A_NUMBER = std::numeric_limits<double>::quiet_NaN();
-constexpr double FOCAL_LENGTH = 520.0;            // [px]
 constexpr double THRESHOLD = 2.0 / FOCAL_LENGTH;  // of inliers
-constexpr double NOISE = 0.5 / FOCAL_LENGTH;      // sd of a coordinate
 constexpr double MAX_YAW = 0.6;                   // [rad]
 constexpr double BY_CHANCE = 2.2 * THRESHOLD;     // about the part of an image within THRESHOLD of a line through it
 constexpr double DEGREE = M_PI / 180.0;
 constexpr int SAMPLE_SIZE = PlanarMotionEstimator::SAMPLE_SIZE;
 
-bool inImage(const Eigen::Vector2d& point)
-{
-  return std::abs(point.x()) < 0.615 && std::abs(point.y()) < 0.46;
-}
-
-Eigen::Vector2d randomPosition(Rng& rng)
-{
-  const double x = uniform(rng, -0.615, 0.615);
-  return { x, uniform(rng, -0.46, 0.46) };
-}
-
-Eigen::Vector2d noisy(const Eigen::Vector2d& position, Rng& rng)
-{
-  const double x = position.x() + NOISE * gaussian(rng);
-  return { x, position.y() + NOISE * gaussian(rng) };
-}
-
 /** The current point of a reference point at a depth, exact; NaN when it is not in the image. */
 Eigen::Vector2d moved(const Eigen::Vector2d& reference, double depth, const PlanarPose& reference_in_current)
 {
-  const Eigen::Vector3d in_reference = depth * reference.homogeneous();
-  const double c = std::cos(reference_in_current.yaw);
-  const double s = std::sin(reference_in_current.yaw);
-  // x right, z ahead; the pose's y is to the left.
-  const Eigen::Vector3d in_current(c * in_reference.x() - s * in_reference.z() - reference_in_current.y,
-                                   in_reference.y(),
-                                   s * in_reference.x() + c * in_reference.z() + reference_in_current.x);
+  const Eigen::Vector3d in_current = test::inCurrentCamera(depth * reference.homogeneous(), reference_in_current);
   const Eigen::Vector2d current = in_current.hnormalized();
   return in_current.z() > 0.2 && inImage(current) ? current : Eigen::Vector2d::Constant(NOT_A_NUMBER);
 }

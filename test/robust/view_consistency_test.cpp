@@ -178,7 +178,7 @@ TEST(ViewConsistentCandidates, SeparatesInliersFromOutliers)
   EXPECT_LE(outliers, 80);  // of 400
 }
 
-TEST(ViewConsistentCandidates, SameSeedSameResult)
+TEST(ViewConsistentCandidates, SameSeedGivesTheSameResult)
 {
   Rng data_rng(4);
   const Correspondences pairs = mixedPairs(30, 30, data_rng);

@@ -5,8 +5,9 @@
 
 #include "support/corner_error.h"
 #include "support/recorded_bag.h"
+#include "support/shipped_files.h"
 #include "support/temporary_directory.h"
-#include "test_paths.h"
+#include "support/text_file.h"
 #include "view_servo/geometry/homography.h"
 #include "view_servo/robust/quantile.h"
 #include "view_servo/views/line_view_matcher.h"
@@ -17,9 +18,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdlib>
-#include <fstream>
-#include <iterator>
 #include <string>
 #include <utility>
 #include <vector>
@@ -48,22 +46,13 @@ trajectories:
     - {time: 6, position: [0.6, -0.1, 0.7], look_at: [0.7, -0.1, 0]}
 )";
 
-std::string shippedWorld(const std::string& name)
-{
-  std::ifstream file(PACKAGE_DIR "/config/worlds/" + name + ".yaml");
-  return { std::istreambuf_iterator<char>(file), {} };
-}
-
 /** Records a trajectory of a world given as text, one image a second. */
 std::vector<Frame> record(const std::string& world, const std::string& trajectory)
 {
   const TemporaryDirectory directory;
-  const std::string file = directory.path() / "world.yaml";
+  const std::string file = writeText(directory.path() / "world.yaml", world);
   const std::string bag = directory.path() / "run.bag";
-  std::ofstream(file) << world;
-  const std::string command = "'" RECORD_BAG_PATH "' '" + file + "' '" + trajectory + "' '" + bag +
-                              "' --rate 1 --urdf '" PACKAGE_DIR "/urdf/puma560.urdf'";
-  EXPECT_EQ(std::system(command.c_str()), 0) << command;
+  recordBag(file, trajectory, bag, { "--rate", "1", "--urdf", PUMA_URDF_FILE });
   return framesOf(bag);
 }
 
@@ -185,7 +174,7 @@ void expectMostMatched(const Tally& tally)
 /** Past the desk's goal, which is where frame GOAL was taken. */
 const std::vector<Frame>& approach()
 {
-  static const std::vector<Frame> frames = record(shippedWorld("desk"), "approach");
+  static const std::vector<Frame> frames = record(readText(worldFile("desk")), "approach");
   return frames;
 }
 constexpr std::size_t GOAL = 9;
@@ -193,7 +182,7 @@ constexpr std::size_t GOAL = 9;
 /** Towards the desk's goal, which the last frame shows, and meanwhile turned away. */
 const std::vector<Frame>& lose()
 {
-  static const std::vector<Frame> frames = record(shippedWorld("desk"), "lose");
+  static const std::vector<Frame> frames = record(readText(worldFile("desk")), "lose");
   return frames;
 }
 
@@ -209,36 +198,36 @@ std::vector<Frame> elsewhere(const std::vector<Frame>& frames, const Frame& refe
 const PointViewMatcher POINTS{ PointViewMatcherParams() };
 const LineViewMatcher LINES{ LineMatcherParams() };
 
-TEST(Bag, HomographiesOfPointsAgreeWithTheTruth)
+TEST(RecordedRun, HomographiesOfPointsAgreeWithTheTruth)
 {
   expectMostMatched(matchAll(POINTS, approach(), approach().at(GOAL), GeometryModel::HOMOGRAPHY));
 }
 
-TEST(Bag, FundamentalMatricesOfPointsAgreeWithTheTruth)
+TEST(RecordedRun, FundamentalMatricesOfPointsAgreeWithTheTruth)
 {
   const Frame& goal = approach().at(GOAL);
   expectMostMatched(matchAll(POINTS, elsewhere(approach(), goal), goal, GeometryModel::FUNDAMENTAL));
 }
 
-TEST(Bag, LinesAgreeWithTheTruth)
+TEST(RecordedRun, LinesAgreeWithTheTruth)
 {
   expectMostMatched(matchAll(LINES, approach(), approach().at(GOAL), GeometryModel::HOMOGRAPHY));
 }
 
-TEST(Bag, LinesAgreeWithTheTruthBeforeACabinet)
+TEST(RecordedRun, LinesAgreeWithTheTruthBeforeACabinet)
 {
-  const std::vector<Frame> frames = record(shippedWorld("cabinet"), "approach");
+  const std::vector<Frame> frames = record(readText(worldFile("cabinet")), "approach");
   expectMostMatched(matchAll(LINES, frames, frames.at(8), GeometryModel::HOMOGRAPHY));
 }
 
-TEST(Bag, PointsDoNotTakeAnotherViewForTheirs)
+TEST(RecordedRun, PointsDoNotTakeAnotherViewForTheirs)
 {
   const Tally tally = matchAll(POINTS, lose(), lose().back(), GeometryModel::HOMOGRAPHY);
   expectMostMatched(tally);
   EXPECT_GE(tally.lost, 3);
 }
 
-TEST(Bag, LinesDoNotTakeAnotherViewForTheirs)
+TEST(RecordedRun, LinesDoNotTakeAnotherViewForTheirs)
 {
   const Tally tally = matchAll(LINES, lose(), lose().back(), GeometryModel::HOMOGRAPHY);
   expectMostMatched(tally);
@@ -247,12 +236,12 @@ TEST(Bag, LinesDoNotTakeAnotherViewForTheirs)
 
 // Corners along the edge between wall and floor lie on one line, and a matrix with it as an epipolar line agrees with
 // whatever they are matched with.
-TEST(Bag, FundamentalMatricesDoNotTakeAnotherViewForTheirs)
+TEST(RecordedRun, FundamentalMatricesDoNotTakeAnotherViewForTheirs)
 {
   EXPECT_GE(matchAll(POINTS, elsewhere(lose(), lose().back()), lose().back(), GeometryModel::FUNDAMENTAL).lost, 3);
 }
 
-TEST(Bag, HomographiesOfAPlaneAreTheTrueOnes)
+TEST(RecordedRun, HomographiesOfAPlaneAreTheTrueOnes)
 {
   const std::vector<Frame> frames = record(PLANE, "back");
   const Frame& reference = frames.back();

@@ -3,7 +3,9 @@
 #include "view_servo/ros/camera_image.h"
 
 #include "support/compressed_image.h"
+#include "support/random_picture.h"
 #include "support/textured_plane.h"
+#include "support/thrown_message.h"
 #include "view_servo/images/image_io.h"
 #include "view_servo/ros/camera_faults.h"
 #include "view_servo/ros/conversions.h"
@@ -35,20 +37,7 @@ CameraImage received(const sensor_msgs::CompressedImage& message)
 /** What decoding an image says; "" when it can be decoded. */
 std::string errorOf(const sensor_msgs::CompressedImage& message)
 {
-  try
-  {
-    toGrey(received(message));
-    return "";
-  }
-  catch (const ImageError& error)
-  {
-    return error.what();
-  }
-}
-
-double difference(const cv::Mat& a, const cv::Mat& b)
-{
-  return a.size() == b.size() && a.type() == b.type() ? cv::norm(a, b, cv::NORM_INF) : 1e9;
+  return thrownMessage<ImageError>([&] { toGrey(received(message)); });
 }
 
 /** Red on the left, blue on the right, which have different grey levels. */
@@ -97,18 +86,19 @@ TEST(CompressedImage, IsDecodedToGrey)
   constexpr double OF_JPEG = 6.0;
   for (const std::string format : { "rgb8; jpeg compressed bgr8", "bgr8; jpeg compressed bgr8", "jpeg" })
   {
-    EXPECT_LT(difference(toGrey(received(compressed(bgr, ".jpg", format))), grey), 60.0) << format;
-    EXPECT_LT(difference(toGrey(received(compressed(bgr, ".jpg", format))).colRange(0, 16), grey.colRange(0, 16)),
-              OF_JPEG)
+    EXPECT_LT(largestDifference(toGrey(received(compressed(bgr, ".jpg", format))), grey), 60.0) << format;
+    EXPECT_LT(
+        largestDifference(toGrey(received(compressed(bgr, ".jpg", format))).colRange(0, 16), grey.colRange(0, 16)),
+        OF_JPEG)
         << format;
-    EXPECT_LE(difference(toGrey(received(compressed(bgr, ".png", format))), grey), 0.0) << "the data decides";
+    EXPECT_LE(largestDifference(toGrey(received(compressed(bgr, ".png", format))), grey), 0.0) << "the data decides";
   }
-  EXPECT_LE(difference(toGrey(received(compressed(bgr, ".png", "bgr8; png compressed bgr8"))), grey), 0.0);
-  EXPECT_LE(difference(toGrey(received(compressed(rgb, ".png", "rgb8; png compressed rgb8"))), grey), 0.0);
-  EXPECT_GT(difference(toGrey(received(compressed(rgb, ".png", "png"))), grey), 40.0);
-  EXPECT_LE(difference(toGrey(received(compressed(grey, ".png", "mono8; png compressed "))), grey), 0.0);
-  EXPECT_LT(difference(toGrey(received(compressed(texturedPicture(1), ".jpg", "mono8; jpeg compressed "))),
-                       texturedPicture(1)),
+  EXPECT_LE(largestDifference(toGrey(received(compressed(bgr, ".png", "bgr8; png compressed bgr8"))), grey), 0.0);
+  EXPECT_LE(largestDifference(toGrey(received(compressed(rgb, ".png", "rgb8; png compressed rgb8"))), grey), 0.0);
+  EXPECT_GT(largestDifference(toGrey(received(compressed(rgb, ".png", "png"))), grey), 40.0);
+  EXPECT_LE(largestDifference(toGrey(received(compressed(grey, ".png", "mono8; png compressed "))), grey), 0.0);
+  EXPECT_LT(largestDifference(toGrey(received(compressed(texturedPicture(1), ".jpg", "mono8; jpeg compressed "))),
+                              texturedPicture(1)),
             60.0);
 }
 
@@ -118,7 +108,7 @@ TEST(CompressedImage, OfABayerMosaicIsGreyEverywhere)
   cv::Mat mosaic(32, 32, CV_8U, cv::Scalar(200));
   const cv::Mat grey = toGrey(received(compressed(mosaic, ".png", "bayer_rggb8; png compressed ")));
   EXPECT_EQ(grey.size(), mosaic.size());
-  EXPECT_LE(difference(grey, mosaic), 1.0);
+  EXPECT_LE(largestDifference(grey, mosaic), 1.0);
 }
 
 TEST(CompressedImage, TellsItsSizeBeforeItIsDecoded)

@@ -9,6 +9,7 @@
 #include "sim/puma.h"
 #include "sim_ros/run_params.h"
 #include "sim_ros/simulation_params.h"
+#include "support/text_file.h"
 #include "test_paths.h"
 #include "view_servo/parameters/parameter.h"
 #include "view_servo/ros/driver_params.h"
@@ -22,7 +23,6 @@
 #include <yaml-cpp/yaml.h>
 
 #include <cstdlib>
-#include <fstream>
 #include <set>
 #include <sstream>
 #include <string>
@@ -168,21 +168,14 @@ std::string rowsOf(const std::vector<Parameter>& table)
   return text;
 }
 
-std::string read(const std::string& file)
-{
-  std::ifstream stream(file);
-  EXPECT_TRUE(stream) << file;
-  return std::string(std::istreambuf_iterator<char>(stream), std::istreambuf_iterator<char>());
-}
-
 /** Compares, or writes where that is asked for. */
 void expectText(const std::string& file, const std::string& text)
 {
   if (std::getenv("VIEW_SERVO_UPDATE") != nullptr)
   {
-    std::ofstream(file) << text;
+    test::writeText(file, text);
   }
-  EXPECT_EQ(read(file), text) << "run this test with VIEW_SERVO_UPDATE=1 to write " << file << " anew";
+  EXPECT_EQ(test::readText(file), text) << "run this test with VIEW_SERVO_UPDATE=1 to write " << file << " anew";
 }
 
 TEST(Config, FilesSayWhatTheTablesSay)
@@ -223,7 +216,7 @@ TEST(Config, DocumentedTablesAreThoseOfTheSources)
   for (const auto& [document, sections] : tables.documented())
   {
     const std::string file = PACKAGE_DIR "/docs/" + document + ".md";
-    std::string text = read(file);
+    std::string text = test::readText(file);
     for (const auto& [heading, table] : sections)
     {
       const std::size_t section = text.find("\n" + heading + "\n");

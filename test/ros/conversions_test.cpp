@@ -2,6 +2,9 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "view_servo/ros/conversions.h"
 
+#include "support/random_picture.h"
+#include "support/thrown_message.h"
+
 #include "view_servo/images/image_io.h"
 #include "view_servo/ros/base_conversions.h"
 
@@ -52,26 +55,9 @@ cv::Mat examplePicture()
   return picture;
 }
 
-double largestDifference(const cv::Mat& a, const cv::Mat& b)
-{
-  cv::Mat difference;
-  cv::absdiff(a, b, difference);
-  double largest = 0.0;
-  cv::minMaxLoc(difference.reshape(1), nullptr, &largest);
-  return largest;
-}
-
 std::string errorOf(const sensor_msgs::Image& image)
 {
-  try
-  {
-    toGrey(image, "the image");
-  }
-  catch (const ImageError& error)
-  {
-    return error.what();
-  }
-  return "";
+  return test::thrownMessage<ImageError>([&] { toGrey(image, "the image"); });
 }
 
 TEST(CameraConversion, KeepsEveryFieldThereAndBack)
@@ -158,7 +144,7 @@ TEST(ImageConversion, TurnsEveryEncodingIntoTheSameGrey)
     const cv::Mat converted = toGrey(toImage(image, encoding, {}), encoding);
     ASSERT_EQ(converted.type(), CV_8UC1) << encoding;
     ASSERT_EQ(converted.size(), grey.size()) << encoding;
-    EXPECT_LE(largestDifference(converted, grey), 1.0) << encoding;
+    EXPECT_LE(test::largestDifference(converted, grey), 1.0) << encoding;
   }
 }
 
@@ -187,7 +173,7 @@ TEST(ImageConversion, DemosaicsBayerPatterns)
     }
     const cv::Mat converted = toGrey(toImage(mosaic, encoding, {}), encoding);
     const cv::Rect inside(2, 2, bgr.cols - 4, bgr.rows - 4);
-    EXPECT_LE(largestDifference(converted(inside), grey(inside)), 3.0) << encoding;
+    EXPECT_LE(test::largestDifference(converted(inside), grey(inside)), 3.0) << encoding;
   }
 }
 

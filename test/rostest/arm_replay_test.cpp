@@ -1,20 +1,17 @@
 // Copyright (c) 2026, the view_servo authors
 // SPDX-License-Identifier: BSD-3-Clause
-#include "child_process.h"
-#include "node_test.h"
-#include "sim/renderer.h"
+#include "replay.h"
 #include "sim/visibility.h"
 #include "sim/world_reader.h"
 #include "support/recorded_bag.h"
+#include "support/shipped_files.h"
 #include "support/temporary_directory.h"
 
-#include "test_paths.h"
 #include "view_servo/Homography.h"
 #include "view_servo/ServoError.h"
 #include "view_servo/ServoToViewAction.h"
 #include "view_servo/control/servo_25d.h"
 #include "view_servo/control/velocity_limiter.h"
-#include "view_servo/views/view_store.h"
 
 #include <actionlib/client/simple_action_client.h>
 #include <geometry_msgs/TwistStamped.h>
@@ -24,7 +21,6 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <cstdlib>
 #include <iterator>
 #include <map>
 #include <memory>
@@ -114,16 +110,11 @@ TEST(ArmReplay, HomographiesAndTwistsAgreeWithTheTruth)
 
   const TemporaryDirectory directory;
   const std::string bag = directory.path() / "approach.bag";
-  const std::string file = PACKAGE_DIR "/config/worlds/rice.yaml";
-  const std::string command = "'" RECORD_BAG_PATH "' '" + file + "' approach '" + bag +
-                              "' --rate 30 --urdf '" PACKAGE_DIR "/urdf/puma560.urdf'";
-  ASSERT_EQ(std::system(command.c_str()), 0) << command;
+  const std::string file = worldFile("rice");
+  recordBag(file, "approach", bag, { "--rate", "30", "--urdf", PUMA_URDF_FILE });
+  ASSERT_FALSE(HasFatalFailure());
   const sim::World world = sim::readWorld(file);
-  StoredView view;
-  view.name = "goal";
-  view.image = sim::SimulatedCamera(world, {}, 77).capture(world.goal);
-  view.region = world.region;
-  ViewStore(viewsDir("homography_tracker")).save(view, true);
+  saveGoal("homography_tracker", world, world.goal, world.region);
   std::map<ros::Time, Eigen::Isometry3d> poses;
   for (const Frame& frame : framesOf(bag))
   {
@@ -136,30 +127,27 @@ TEST(ArmReplay, HomographiesAndTwistsAgreeWithTheTruth)
   ASSERT_TRUE(waitForService("homography_tracker/start"));
   ServoToViewGoal goal;
   goal.view = "goal";
-  bool sent = false;
   std::unique_ptr<actionlib::SimpleActionClient<ServoToViewAction>> client;
-  {
-    ChildProcess play({ "rosbag", "play", "--clock", "--quiet", playRate(0.5), "--wait-for-subscribers", "--topics",
-                        "/camera/image_raw", "/camera/camera_info", "/tf", "/joint_states", "--bags=" + bag });
-    ASSERT_TRUE(waitUntil([] { return ros::Time::isValid(); }));  // a client waits for that without end
-    client = std::make_unique<actionlib::SimpleActionClient<ServoToViewAction>>("servo", false);
-    ASSERT_TRUE(waitUntil([&] { return client->isServerConnected(); }));
-    bool played = false;
-    for (int patience = 0; patience < 4 && !played; ++patience)
+  bool sent = false;
+  const auto send_goal = [&] {
+    if (!client && ros::Time::isValid())  // a client waits for that without end
     {
-      played = waitUntil([&] {
-        if (!sent || (client->getState().isDone() && client->getResult() && client->getResult()->iterations == 0))
-        {
-          client->sendGoal(goal);  // as soon as the camera is known
-          sent = true;
-        }
-        return play.exited();
-      });
+      client = std::make_unique<actionlib::SimpleActionClient<ServoToViewAction>>("servo", false);
     }
-    ASSERT_TRUE(played);
-  }
+    if (!client || !client->isServerConnected())
+    {
+      return;
+    }
+    if (!sent || (client->getState().isDone() && client->getResult() && client->getResult()->iterations == 0))
+    {
+      client->sendGoal(goal);  // as soon as the camera is known
+      sent = true;
+    }
+  };
+  playBag(bag, 0.5, { "/camera/image_raw", "/camera/camera_info", "/tf", "/joint_states" }, send_goal);
+  ASSERT_FALSE(HasFatalFailure());
   // The bag ends at the view.
-  ASSERT_TRUE(client->getState().isDone()) << errors.messages().size() << " errors";
+  ASSERT_TRUE(client && client->getState().isDone()) << errors.messages().size() << " errors";
   EXPECT_TRUE(client->getResult()->success) << client->getResult()->message;
 
   const TrueView truth(world);

@@ -1,6 +1,7 @@
 // Copyright (c) 2026, the view_servo authors
 // SPDX-License-Identifier: BSD-3-Clause
 #include "driver_cases.h"
+#include "support/cameras.h"
 
 #include "test_paths.h"
 #include "view_servo/Homography.h"
@@ -133,12 +134,10 @@ private:
 
   sensor_msgs::CameraInfo info(const std_msgs::Header& header) const
   {
-    Camera model;
-    model.width = 480;
-    model.height = 360;
-    if (calibrated)
+    Camera model = pinholeCamera({ 480, 360 }, focal_length, focal_length, 240.0, 180.0);
+    if (!calibrated)
     {
-      model.k << focal_length, 0.0, 240.0, 0.0, focal_length, 180.0, 0.0, 0.0, 1.0;
+      model.k.setZero();
     }
     model.projection.leftCols<3>() = model.k;
     return toCameraInfo(model, header);
@@ -190,15 +189,15 @@ private:
   ros::Publisher joints_;
 };
 
-INSTANTIATE_TYPED_TEST_SUITE_P(Servo25d, DriverCases, FakeArm);
+INSTANTIATE_TYPED_TEST_SUITE_P(Servo25d, EveryDriverTest, FakeArm);
 
-class ArmServoTest : public DriverTest<FakeArm>
+class Servo25dNodeTest : public DriverTest<FakeArm>
 {
 protected:
   Recorder<ServoError> errors_{ ns_ + "/servo_error" };
 };
 
-TEST_F(ArmServoTest, DrivesTowardsTheView)
+TEST_F(Servo25dNodeTest, DrivesTowardsTheView)
 {
   drive();
   const geometry_msgs::TwistStamped command = commands_.last();
@@ -221,7 +220,7 @@ TEST_F(ArmServoTest, DrivesTowardsTheView)
   EXPECT_EQ(status_.last()->inliers, 50);
 }
 
-TEST_F(ArmServoTest, EndsAtTheView)
+TEST_F(Servo25dNodeTest, EndsAtTheView)
 {
   drive();
   robot_.offset = 2e-4;
@@ -236,56 +235,47 @@ TEST_F(ArmServoTest, EndsAtTheView)
   EXPECT_TRUE(waitUntil([this] { return robot_.wantedView().view.empty(); }));
 }
 
-TEST_F(ArmServoTest, StopsWhenTheViewIsCoveredAndGoesOnAfterwards)
+TEST_F(Servo25dNodeTest, StopsWhenTheViewIsCoveredAndGoesOnAfterwards)
 {
   drive();
-  expectToStop([this] { robot_.covered = true; }, ServoStatus::LOST, "a hand is in front of it");
-  robot_.covered = false;
-  expectToGoOn();
+  expectToStopWhile(robot_.covered, "a hand is in front of it");
 }
 
-TEST_F(ArmServoTest, GivesUpWhenTheViewStaysCovered)
+TEST_F(Servo25dNodeTest, GivesUpWhenTheViewStaysCovered)
 {
   drive();
   robot_.covered = true;
-  const ServoToViewResult final = result();
-  EXPECT_FALSE(final.success);
-  EXPECT_NE(final.message.find("the view is lost: a hand is in front of it"), std::string::npos) << final.message;
+  const auto final = expectToFail("the view is lost: a hand is in front of it");
   EXPECT_EQ(final.final.state, ServoStatus::ABORTED);
 }
 
-TEST_F(ArmServoTest, StopsForOldHomographies)
+TEST_F(Servo25dNodeTest, StopsForOldHomographies)
 {
   drive();
-  // Gradually, so that time does not go back.
-  const auto delay_more = [this] {
-    robot_.delay = std::min(0.9, robot_.delay + 0.005);
-  };
-  EXPECT_TRUE(waitUntil([this] { return reason().find(" old") != std::string::npos; }, delay_more)) << reason();
-  EXPECT_TRUE(waitUntil([this] { return !commands_.moving(); }));
+  expectToStopForOldStamps(0.9, " old");
 }
 
-TEST_F(ArmServoTest, StopsForHomographiesOfAnotherView)
+TEST_F(Servo25dNodeTest, StopsForHomographiesOfAnotherView)
 {
   drive();
   expectToEnd([this] { robot_.other_view = true; }, GoalState::ABORTED, "are of view 'another', not of 'goal'");
 }
 
-TEST_F(ArmServoTest, StopsForNonsense)
+TEST_F(Servo25dNodeTest, StopsForNonsense)
 {
   drive();
   expectToStop([this] { robot_.nonsense = true; }, ServoStatus::LOST,
                "are not used: its rotation is no unit quaternion");
 }
 
-TEST_F(ArmServoTest, StopsAtAJointLimit)
+TEST_F(Servo25dNodeTest, StopsAtAJointLimit)
 {
   drive();
   expectToEnd([this] { robot_.joint = 1.74; }, GoalState::ABORTED, "joint limit reached: 'joint5' is at 1.740",
               2.0 * STOPS_WITHIN);
 }
 
-TEST_F(ArmServoTest, ForgetsAJointThatIsNotHeardOfAnyMore)
+TEST_F(Servo25dNodeTest, ForgetsAJointThatIsNotHeardOfAnyMore)
 {
   drive();
   expectToEnd([this] { robot_.joint = 1.74; }, GoalState::ABORTED, "joint limit reached", 2.0 * STOPS_WITHIN);
@@ -298,7 +288,7 @@ TEST_F(ArmServoTest, ForgetsAJointThatIsNotHeardOfAnyMore)
   })) << reason();
 }
 
-TEST_F(ArmServoTest, DoesWithoutJointStatesThatNeverCome)
+TEST_F(Servo25dNodeTest, DoesWithoutJointStatesThatNeverCome)
 {
   robot_.joints_come = false;
   const Clock::time_point moment = Clock::now();
@@ -315,7 +305,7 @@ TEST_F(ArmServoTest, DoesWithoutJointStatesThatNeverCome)
   })) << reason();
 }
 
-TEST_F(ArmServoTest, StopsWhenJointStatesStopAndGoesOnWithThem)
+TEST_F(Servo25dNodeTest, StopsWhenJointStatesStopAndGoesOnWithThem)
 {
   drive();
   robot_.joints_come = false;
@@ -325,7 +315,7 @@ TEST_F(ArmServoTest, StopsWhenJointStatesStopAndGoesOnWithThem)
   expectToGoOn();
 }
 
-TEST_F(ArmServoTest, StopsForAJointThatIsNowhere)
+TEST_F(Servo25dNodeTest, StopsForAJointThatIsNowhere)
 {
   drive();
   robot_.joint = 99.0;
@@ -334,7 +324,7 @@ TEST_F(ArmServoTest, StopsForAJointThatIsNowhere)
   EXPECT_TRUE(waitUntil([this] { return !commands_.moving(); }));
 }
 
-TEST_F(ArmServoTest, StopsWithoutACalibration)
+TEST_F(Servo25dNodeTest, StopsWithoutACalibration)
 {
   drive();
   expectToEnd([this] { robot_.calibrated = false; }, GoalState::ABORTED, "not calibrated");
@@ -342,17 +332,9 @@ TEST_F(ArmServoTest, StopsWithoutACalibration)
   EXPECT_NE(result().message.find("not calibrated"), std::string::npos);
 }
 
-class DryArmServoTest : public DriverTest<FakeArm>
-{
-protected:
-  DryArmServoTest() : DriverTest("dry", "cmd_vel_dry")
-  {
-  }
+using DryServo25dNodeTest = DryDriverTest<FakeArm>;
 
-  Commands real_commands_{ "dry/cmd_vel" };
-};
-
-TEST_F(DryArmServoTest, KeepsCommandsToItself)
+TEST_F(DryServo25dNodeTest, KeepsCommandsToItself)
 {
   enable(false);
   drive();
@@ -366,9 +348,7 @@ TEST_F(DryArmServoTest, KeepsCommandsToItself)
 int main(int argc, char** argv)
 {
   return view_servo::test::runDriverTests(argc, argv, "arm_servo_test", "driving/servo_25d", [] {
-    view_servo::StoredView view;
-    view.name = "goal";
-    view.image = view_servo::test::texturedPicture(1);
+    view_servo::StoredView view = view_servo::test::viewOf("goal", view_servo::test::texturedPicture(1));
     view.region = view_servo::test::REGION;
     return view;
   });

@@ -4,7 +4,9 @@
 #include "node_test.h"
 #include "sim_ros/robot_messages.h"
 #include "support/recorded_bag.h"
+#include "support/shipped_files.h"
 #include "support/temporary_directory.h"
+#include "support/text_file.h"
 
 #include "test_paths.h"
 #include "view_servo/LineMatches.h"
@@ -22,8 +24,6 @@
 #include <rosgraph_msgs/Clock.h>
 
 #include <algorithm>
-#include <cstdlib>
-#include <fstream>
 #include <map>
 #include <memory>
 #include <optional>
@@ -70,11 +70,10 @@ protected:
   static void SetUpTestSuite()
   {
     directory_ = std::make_unique<TemporaryDirectory>();
-    const std::string world = directory_->path() / "wall.yaml";
-    std::ofstream(world) << WORLD;
+    const std::string world = writeText(directory_->path() / "wall.yaml", WORLD);
     bag_ = directory_->path() / "run.bag";
-    const std::string command = "'" RECORD_BAG_PATH "' '" + world + "' way '" + bag_ + "'";
-    ASSERT_EQ(std::system(command.c_str()), 0) << command;
+    recordBag(world, "way", bag_);
+    ASSERT_FALSE(HasFatalFailure());
 
     StoredView first;
     Camera camera;
@@ -104,7 +103,7 @@ protected:
     for (const char* node : { "point_matcher", "line_matcher" })
     {
       ASSERT_TRUE(waitForService(std::string(node) + "/set_view"));
-      ViewStore(viewsDir(node)).save(first, true);
+      saveView(node, first);
     }
   }
 
@@ -121,8 +120,7 @@ protected:
     {
       SetView::Request request;
       request.view = view;
-      SetView::Response response;
-      ASSERT_TRUE(callService(std::string(node) + "/set_view", request, response));
+      const SetView::Response response = answerOf<SetView>(std::string(node) + "/set_view", request);
       ASSERT_TRUE(response.success) << response.message;
     }
   }
@@ -337,16 +335,12 @@ protected:
 TEST_P(ShippedRunTest, EachImageIsAnsweredTrulyOrRefused)
 {
   const std::string bag = directory_->path() / (std::string(GetParam().world) + "_" + GetParam().trajectory + ".bag");
-  const std::string command = "'" RECORD_BAG_PATH "' '" PACKAGE_DIR "/config/worlds/" + std::string(GetParam().world) +
-                              ".yaml' " + GetParam().trajectory + " '" + bag + "' --rate 1";
-  ASSERT_EQ(std::system(command.c_str()), 0) << command;
+  recordBag(worldFile(GetParam().world), GetParam().trajectory, bag, { "--rate", "1" });
+  ASSERT_FALSE(HasFatalFailure());
   const std::vector<Frame> frames = framesOf(bag);
-  StoredView last;
-  last.name = "last";
-  last.image = frames.back().image;
   for (const char* node : { "point_matcher", "line_matcher" })
   {
-    ViewStore(viewsDir(node)).save(last, true);
+    saveView(node, viewOf("last", frames.back().image));
   }
   setViews("last");
   ASSERT_TRUE(camera_.waitForSubscribers(2));

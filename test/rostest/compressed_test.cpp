@@ -70,14 +70,6 @@ protected:
     send(compressed(picture, ".jpg", "mono8; jpeg compressed "));
   }
 
-  template <typename Service>
-  typename Service::Response call(const std::string& service, const typename Service::Request& request) const
-  {
-    typename Service::Response response;
-    EXPECT_TRUE(callService(service, request, response)) << service << " did not answer";
-    return response;
-  }
-
   /** Stores the picture from the camera, not what it sent before. */
   void teach(const std::string& name)
   {
@@ -113,7 +105,7 @@ TEST_F(CompressedTest, ImagesAreStoredAndMatchedAndDamagedOnesLeftOut)
   teach("wall");
   SetView::Request view;
   view.view = "wall";
-  ASSERT_TRUE(call<SetView>("point_matcher/set_view", view).success);
+  ASSERT_TRUE(answerOf<SetView>("point_matcher/set_view", view).success);
   expectMatches();
 
   // What comes between good images ends nothing.
@@ -147,7 +139,7 @@ TEST_F(CompressedTest, ServicesUseTheLatestImage)
   MatchPoints::Response response;
   EXPECT_TRUE(waitUntil(
       [&] {
-        response = call<MatchPoints>("point_matcher/match", request);
+        response = answerOf<MatchPoints>("point_matcher/match", request);
         return response.success && cornerError(toMatrix(response.model_matrix), exampleHomography()) < 1.5;
       },
       [&] { send(seen_); }))

@@ -18,17 +18,17 @@ namespace test
 /** @file What every driver must do, whatever its robot is: instantiated by the test of each. */
 
 template <typename Robot>
-class DriverCases : public DriverTest<Robot>
+class EveryDriverTest : public DriverTest<Robot>
 {
 };
 
-TYPED_TEST_SUITE_P(DriverCases);
+TYPED_TEST_SUITE_P(EveryDriverTest);
 
 using actionlib::SimpleClientGoalState;
 
 // ------------------------------------------------------------------------------------------------- while it prepares
 
-TYPED_TEST_P(DriverCases, WaitsForAPeerThatAnswersLate)
+TYPED_TEST_P(EveryDriverTest, WaitsForAPeerThatAnswersLate)
 {
   this->prepareInVain();
   EXPECT_FALSE(this->commands_.moving());
@@ -36,17 +36,15 @@ TYPED_TEST_P(DriverCases, WaitsForAPeerThatAnswersLate)
   this->expectToGoOn();
 }
 
-TYPED_TEST_P(DriverCases, EndsInTimeWhenThePeerNeverAnswers)
+TYPED_TEST_P(EveryDriverTest, EndsInTimeWhenThePeerNeverAnswers)
 {
   this->prepareInVain(1.5);
-  const auto final = this->result();
-  EXPECT_FALSE(final.success);
-  EXPECT_NE(final.message.find("not begun within 1.5 s"), std::string::npos) << final.message;
+  const auto final = this->expectToFail("not begun within 1.5 s");
   EXPECT_NE(final.message.find(TypeParam::SILENT), std::string::npos) << final.message;
   EXPECT_LT(final.duration, 1.5 + STOPS_WITHIN);
 }
 
-TYPED_TEST_P(DriverCases, IsCancelledWhileItPrepares)
+TYPED_TEST_P(EveryDriverTest, IsCancelledWhileItPrepares)
 {
   this->prepareInVain();
   this->expectToEnd([this] { this->client_.cancelGoal(); }, SimpleClientGoalState::PREEMPTED, "cancelled");
@@ -54,14 +52,14 @@ TYPED_TEST_P(DriverCases, IsCancelledWhileItPrepares)
               waitUntil([this] { return this->robot_.wantedView().view.empty(); }));
 }
 
-TYPED_TEST_P(DriverCases, IsDisabledWhileItPrepares)
+TYPED_TEST_P(EveryDriverTest, IsDisabledWhileItPrepares)
 {
   this->prepareInVain();
   this->expectToEnd([this] { this->enable(false); }, SimpleClientGoalState::ABORTED, "disabled");
   EXPECT_TRUE(waitUntil([this] { return this->status_.last()->state == ServoStatus::DISABLED; }));
 }
 
-TYPED_TEST_P(DriverCases, IsReplacedWhileItPrepares)
+TYPED_TEST_P(EveryDriverTest, IsReplacedWhileItPrepares)
 {
   this->prepareInVain();
   typename TestFixture::Client other(this->ns_ + "/" + TypeParam::ACTION, false);
@@ -75,7 +73,7 @@ TYPED_TEST_P(DriverCases, IsReplacedWhileItPrepares)
   EXPECT_NE(other.getState().getText().find("it is too dark"), std::string::npos) << other.getState().getText();
 }
 
-TYPED_TEST_P(DriverCases, EndsItsProcessWhileItPrepares)
+TYPED_TEST_P(EveryDriverTest, EndsItsProcessWhileItPrepares)
 {
   typename TestFixture::OtherDriver other(this->viewsDirectory());
   other.robot.answers = false;
@@ -86,27 +84,25 @@ TYPED_TEST_P(DriverCases, EndsItsProcessWhileItPrepares)
   other.expectToEnd([&] { other.node.interrupt(); });
 }
 
-TYPED_TEST_P(DriverCases, RefusesAViewThatItsPeerRefuses)
+TYPED_TEST_P(EveryDriverTest, RefusesAViewThatItsPeerRefuses)
 {
   this->robot_.refuses = true;
   this->send("goal");
-  const auto final = this->result();
-  EXPECT_FALSE(final.success);
-  EXPECT_NE(final.message.find("it is too dark"), std::string::npos) << final.message;
+  this->expectToFail("it is too dark");
 }
 
-TYPED_TEST_P(DriverCases, RefusesAViewThatIsNotThere)
+TYPED_TEST_P(EveryDriverTest, RefusesAViewThatIsNotThere)
 {
   this->expectToEnd([this] { this->send("unknown"); }, SimpleClientGoalState::ABORTED, "unknown", 2.0 * SLOWDOWN);
 }
 
-TYPED_TEST_P(DriverCases, RefusesWhenDisabled)
+TYPED_TEST_P(EveryDriverTest, RefusesWhenDisabled)
 {
   this->enable(false);
   this->expectToEnd([this] { this->send("goal"); }, SimpleClientGoalState::ABORTED, "call ~enable", 2.0 * SLOWDOWN);
 }
 
-TYPED_TEST_P(DriverCases, RefusesTimesThatAreNone)
+TYPED_TEST_P(EveryDriverTest, RefusesTimesThatAreNone)
 {
   this->send("goal", std::numeric_limits<double>::quiet_NaN());
   EXPECT_NE(this->result().message.find("finite"), std::string::npos);
@@ -116,20 +112,20 @@ TYPED_TEST_P(DriverCases, RefusesTimesThatAreNone)
 
 // ---------------------------------------------------------------------------------------------------- while it drives
 
-TYPED_TEST_P(DriverCases, StopsWhenDisabled)
+TYPED_TEST_P(EveryDriverTest, StopsWhenDisabled)
 {
   this->drive();
   this->expectToEnd([this] { this->enable(false); }, SimpleClientGoalState::ABORTED, "disabled");
   EXPECT_TRUE(waitUntil([this] { return this->status_.last()->state == ServoStatus::DISABLED; }));
 }
 
-TYPED_TEST_P(DriverCases, StopsWhenTheGoalIsCancelled)
+TYPED_TEST_P(EveryDriverTest, StopsWhenTheGoalIsCancelled)
 {
   this->drive();
   this->expectToEnd([this] { this->client_.cancelGoal(); }, SimpleClientGoalState::PREEMPTED, "cancelled");
 }
 
-TYPED_TEST_P(DriverCases, StopsForAnotherGoal)
+TYPED_TEST_P(EveryDriverTest, StopsForAnotherGoal)
 {
   this->drive();
   typename TestFixture::Client other(this->ns_ + "/" + TypeParam::ACTION, false);
@@ -140,7 +136,7 @@ TYPED_TEST_P(DriverCases, StopsForAnotherGoal)
   EXPECT_TRUE(waitUntil([&] { return other.getState().isDone(); }));
 }
 
-TYPED_TEST_P(DriverCases, StopsBeforeItsProcessEnds)
+TYPED_TEST_P(EveryDriverTest, StopsBeforeItsProcessEnds)
 {
   for (const bool by_signal_of_a_person : { true, false })
   {
@@ -151,17 +147,15 @@ TYPED_TEST_P(DriverCases, StopsBeforeItsProcessEnds)
   }
 }
 
-TYPED_TEST_P(DriverCases, GivesUpInTime)
+TYPED_TEST_P(EveryDriverTest, GivesUpInTime)
 {
   this->drive();
   this->send("goal", 1.0);  // replaces the other
-  const auto final = this->result();
-  EXPECT_FALSE(final.success);
-  EXPECT_NE(final.message.find("within 1 s"), std::string::npos) << final.message;
+  const auto final = this->expectToFail("within 1 s");
   EXPECT_GE(final.duration, 1.0);
 }
 
-TYPED_TEST_P(DriverCases, KeepsLimitsThatPeopleChangeWhileItDrives)
+TYPED_TEST_P(EveryDriverTest, KeepsLimitsThatPeopleChangeWhileItDrives)
 {
   constexpr double SLOW = 0.002;  // [m/s, rad/s]
   constexpr std::chrono::milliseconds AT_ONCE(static_cast<int>(100.0 * SLOWDOWN));
@@ -188,7 +182,7 @@ TYPED_TEST_P(DriverCases, KeepsLimitsThatPeopleChangeWhileItDrives)
   EXPECT_EQ(set(std::numeric_limits<double>::quiet_NaN()), most);
 }
 
-TYPED_TEST_P(DriverCases, StopsWhenThePeerFallsSilentAndGoesOnWithIt)
+TYPED_TEST_P(EveryDriverTest, StopsWhenThePeerFallsSilentAndGoesOnWithIt)
 {
   this->drive();
   this->expectToStop([this] { this->robot_.hush(true); }, ServoStatus::LOST, TypeParam::SILENT);
@@ -196,46 +190,40 @@ TYPED_TEST_P(DriverCases, StopsWhenThePeerFallsSilentAndGoesOnWithIt)
   this->expectToGoOn();
 }
 
-TYPED_TEST_P(DriverCases, GivesUpWhenThePeerStaysSilent)
+TYPED_TEST_P(EveryDriverTest, GivesUpWhenThePeerStaysSilent)
 {
   this->drive();
   this->robot_.hush(true);
-  const auto final = this->result();
-  EXPECT_FALSE(final.success);
-  EXPECT_NE(final.message.find(TypeParam::SILENT), std::string::npos) << final.message;
+  this->expectToFail(TypeParam::SILENT);
 }
 
-TYPED_TEST_P(DriverCases, StopsWhenTimeGoesBack)
+TYPED_TEST_P(EveryDriverTest, StopsWhenTimeGoesBack)
 {
   this->drive();
   this->expectToEnd([this] { this->robot_.delay = 5.0; }, SimpleClientGoalState::ABORTED, "gone back");
 }
 
-TYPED_TEST_P(DriverCases, StopsForStampsThatStandStill)
+TYPED_TEST_P(EveryDriverTest, StopsForStampsThatStandStill)
 {
   this->drive();
-  this->expectToStop([this] { this->robot_.frozen = true; }, ServoStatus::LOST, "stand still");
-  this->robot_.frozen = false;
-  this->expectToGoOn();
+  this->expectToStopWhile(this->robot_.frozen, "stand still");
 }
 
-TYPED_TEST_P(DriverCases, StopsForStampsThatAreZero)
+TYPED_TEST_P(EveryDriverTest, StopsForStampsThatAreZero)
 {
   this->drive();
   this->expectToStop([this] { this->robot_.unstamped = true; }, ServoStatus::LOST, "no stamp");
-  const auto final = this->result();
-  EXPECT_FALSE(final.success);
-  EXPECT_NE(final.message.find("no stamp"), std::string::npos) << final.message;
+  this->expectToFail("no stamp");
 }
 
-TYPED_TEST_P(DriverCases, StopsWhenTheCalibrationChanges)
+TYPED_TEST_P(EveryDriverTest, StopsWhenTheCalibrationChanges)
 {
   this->drive();
   this->expectToEnd([this] { this->robot_.focal_length = 510.0; }, SimpleClientGoalState::ABORTED,
                     "calibration has changed", 2.0 * STOPS_WITHIN);
 }
 
-TYPED_TEST_P(DriverCases, StopsWhenNobodyFollowsAnyMore)
+TYPED_TEST_P(EveryDriverTest, StopsWhenNobodyFollowsAnyMore)
 {
   this->drive();
   this->commands_.shutdown();
@@ -243,12 +231,10 @@ TYPED_TEST_P(DriverCases, StopsWhenNobodyFollowsAnyMore)
   EXPECT_NE(this->client_.getState().getText().find("nobody listens any more"), std::string::npos)
       << this->client_.getState().getText();
   this->send("goal", 1.5);
-  const auto final = this->result();
-  EXPECT_FALSE(final.success);
-  EXPECT_NE(final.message.find("nobody listens on"), std::string::npos) << final.message;
+  this->expectToFail("nobody listens on");
 }
 
-TYPED_TEST_P(DriverCases, StandsWhileItIsHeld)
+TYPED_TEST_P(EveryDriverTest, StandsWhileItIsHeld)
 {
   ros::Publisher stop = ros::NodeHandle(this->ns_).advertise<std_msgs::Bool>("stop", 1, true);
   std_msgs::Bool message;
@@ -261,7 +247,7 @@ TYPED_TEST_P(DriverCases, StandsWhileItIsHeld)
   this->expectToGoOn();
 }
 
-TYPED_TEST_P(DriverCases, SurvivesWhateverIsInMessages)
+TYPED_TEST_P(EveryDriverTest, SurvivesWhateverIsInMessages)
 {
   this->robot_.publishExtremes();  // without a goal
   this->drive();
@@ -273,7 +259,7 @@ TYPED_TEST_P(DriverCases, SurvivesWhateverIsInMessages)
   this->drive();  // and it goes on
 }
 
-TYPED_TEST_P(DriverCases, TakesManyGoalsWhilePeersComeAndGo)
+TYPED_TEST_P(EveryDriverTest, TakesManyGoalsWhilePeersComeAndGo)
 {
   const char* wanted = std::getenv("VIEW_SERVO_GOALS");
   const int goals = wanted != nullptr ? std::atoi(wanted) : 200;
@@ -305,7 +291,7 @@ TYPED_TEST_P(DriverCases, TakesManyGoalsWhilePeersComeAndGo)
   this->drive();
 }
 
-REGISTER_TYPED_TEST_SUITE_P(DriverCases, WaitsForAPeerThatAnswersLate, EndsInTimeWhenThePeerNeverAnswers,
+REGISTER_TYPED_TEST_SUITE_P(EveryDriverTest, WaitsForAPeerThatAnswersLate, EndsInTimeWhenThePeerNeverAnswers,
                             IsCancelledWhileItPrepares, IsDisabledWhileItPrepares, IsReplacedWhileItPrepares,
                             EndsItsProcessWhileItPrepares, RefusesAViewThatItsPeerRefuses, RefusesAViewThatIsNotThere,
                             RefusesWhenDisabled, RefusesTimesThatAreNone, StopsWhenDisabled,

@@ -9,13 +9,12 @@
 
 #include "view_servo/ServoStatus.h"
 #include "view_servo/WantedView.h"
-#include "view_servo/ros/call_service.h"
-#include "view_servo/views/view_store.h"
 
 #include <actionlib/client/simple_action_client.h>
 #include <gtest/gtest.h>
 #include <std_srvs/SetBool.h>
 
+#include <algorithm>
 #include <atomic>
 #include <chrono>
 #include <cstdint>
@@ -161,6 +160,22 @@ private:
   std::thread thread_;
 };
 
+/** Enables a driver and sends it a goal, as soon as it takes one. @param enable_service of the driver. */
+template <typename Action>
+void enableAndSend(actionlib::SimpleActionClient<Action>& client, const std::string& enable_service,
+                   const std::string& view, double timeout)
+{
+  ASSERT_TRUE(waitForService(enable_service));
+  ASSERT_TRUE(waitUntil([&] { return client.isServerConnected(); }));
+  std_srvs::SetBool::Request enable;
+  enable.data = 1;
+  EXPECT_TRUE(answerOf<std_srvs::SetBool>(enable_service, enable).success);
+  typename Action::_action_goal_type::_goal_type goal;
+  goal.view = view;
+  goal.timeout = timeout;
+  client.sendGoal(goal);
+}
+
 /**
  * A driver with a robot that the test plays. `Robot` is a FakeRobot with
  *  - `Action`, `Command`, and the names DRIVER (node), ACTION, SILENT (words about a peer that does not answer);
@@ -213,10 +228,10 @@ protected:
 
   void enable(bool on) const
   {
-    std_srvs::SetBool service;
-    service.request.data = on ? 1 : 0;
-    ASSERT_TRUE(callService(enableService(), service));
-    EXPECT_TRUE(service.response.success) << service.response.message;
+    std_srvs::SetBool::Request request;
+    request.data = on ? 1 : 0;
+    const std_srvs::SetBool::Response response = answerOf<std_srvs::SetBool>(enableService(), request);
+    EXPECT_TRUE(response.success) << response.message;
   }
 
   void send(const std::string& view, double timeout = 60.0)
@@ -268,6 +283,26 @@ protected:
     EXPECT_TRUE(waitUntil([this] { return commands_.moving(); })) << reason();
   }
 
+  /** While `flag` is not as it was, the robot must stand, with a status that has these words in it; then it goes on. */
+  void expectToStopWhile(std::atomic<bool>& flag, const std::string& words)
+  {
+    const bool usual = flag;
+    expectToStop([&] { flag = !usual; }, ServoStatus::LOST, words);
+    flag = usual;
+    expectToGoOn();
+  }
+
+  /** When stamps fall behind, up to a delay [s], the robot must stand, for a reason with these words. */
+  void expectToStopForOldStamps(double most, const std::string& words)
+  {
+    // Gradually, so that time does not go back.
+    const auto delay_more = [&] {
+      robot_.delay = std::min(most, robot_.delay + 0.005);
+    };
+    EXPECT_TRUE(waitUntil([&] { return reason().find(words) != std::string::npos; }, delay_more)) << reason();
+    EXPECT_TRUE(waitUntil([this] { return !commands_.moving(); }));
+  }
+
   /** The result of the goal sent last; what is told of it must agree, and the last command must be zero. */
   Result result()
   {
@@ -284,6 +319,15 @@ protected:
     return *found;
   }
 
+  /** The goal sent last must fail, for a reason with these words. @return its result. */
+  Result expectToFail(const std::string& words)
+  {
+    Result final = result();
+    EXPECT_FALSE(final.success);
+    EXPECT_NE(final.message.find(words), std::string::npos) << final.message;
+    return final;
+  }
+
   /** After `cause` the goal must end in time, in this state of the action and with these words. */
   void expectToEnd(const std::function<void()>& cause, GoalState::StateEnum state, const std::string& words,
                    double within = STOPS_WITHIN)
@@ -292,10 +336,8 @@ protected:
     cause();
     EXPECT_TRUE(waitUntil([this] { return client_.getState().isDone(); })) << reason();
     EXPECT_LT(std::chrono::duration<double>(Clock::now() - moment).count(), within);
-    const Result final = result();
-    EXPECT_FALSE(final.success);
+    expectToFail(words);
     EXPECT_EQ(client_.getState().state_, state);
-    EXPECT_NE(final.message.find(words), std::string::npos) << final.message;
     EXPECT_LT(commands_.lastMotionAfter(moment), STOPS_WITHIN);
   }
 
@@ -321,15 +363,7 @@ protected:
 
     void send(const std::string& view)
     {
-      const std::string service = std::string("ending/") + Robot::DRIVER + "/enable";
-      ASSERT_TRUE(waitForService(service)) << node.output();
-      std_srvs::SetBool enable;
-      enable.request.data = 1;
-      ASSERT_TRUE(callService(service, enable));
-      ASSERT_TRUE(waitUntil([this] { return client.isServerConnected(); }));
-      Goal goal;
-      goal.view = view;
-      client.sendGoal(goal);
+      enableAndSend(client, std::string("ending/") + Robot::DRIVER + "/enable", view, Goal().timeout);
     }
 
     /** The process must end in time, and leave a robot that stands and a goal that has ended. */
@@ -367,6 +401,18 @@ protected:
   Client client_;
 };
 
+/** A driver with ~dry_run: its commands go to the topic cmd_vel_dry. */
+template <typename Robot>
+class DryDriverTest : public DriverTest<Robot>
+{
+protected:
+  DryDriverTest() : DriverTest<Robot>("dry", "cmd_vel_dry")
+  {
+  }
+
+  CommandsOf<typename Robot::Command> real_commands_{ "dry/cmd_vel" };
+};
+
 /** main() of a driver's test. @param make the view that goals name "goal". @param node whose directory of views it goes to. */
 inline int runDriverTests(int argc, char** argv, const std::string& name, const std::string& node,
                           const std::function<StoredView()>& make)
@@ -376,7 +422,7 @@ inline int runDriverTests(int argc, char** argv, const std::string& name, const 
   ros::NodeHandle keeps_ros_running;
   ros::AsyncSpinner spinner(2);
   spinner.start();
-  ViewStore(viewsDir(node)).save(make(), true);
+  saveView(node, make());
   const int result = RUN_ALL_TESTS();
   removeViews(node);
   return result;

@@ -1,25 +1,20 @@
 // Copyright (c) 2026, the view_servo authors
 // SPDX-License-Identifier: BSD-3-Clause
-#include "child_process.h"
-#include "node_test.h"
+#include "replay.h"
 #include "sim/nomad.h"
-#include "sim/renderer.h"
 #include "sim/world_reader.h"
-#include "sim_ros/robot_messages.h"
 #include "support/recorded_bag.h"
+#include "support/shipped_files.h"
 #include "support/temporary_directory.h"
 
-#include "test_paths.h"
 #include "view_servo/Heading.h"
 #include "view_servo/SetView.h"
 #include "view_servo/geometry/planar_pose.h"
 #include "view_servo/ros/call_service.h"
-#include "view_servo/views/view_store.h"
 
 #include <gtest/gtest.h>
 
 #include <cmath>
-#include <cstdlib>
 #include <map>
 #include <string>
 #include <vector>
@@ -31,7 +26,7 @@ namespace test
 namespace
 {
 /** On the floor, x along the optical axis. */
-PlanarPose onFloor(const Eigen::Isometry3d& camera)
+PlanarPose planarPoseOf(const Eigen::Isometry3d& camera)
 {
   const Eigen::Vector3d axis = camera.linear().col(2);
   return { camera.translation().x(), camera.translation().y(), std::atan2(axis.y(), axis.x()) };
@@ -52,15 +47,12 @@ TEST_P(HomingReplayTest, HeadingsAndArrivalAgreeWithTheTruth)
 
   const TemporaryDirectory directory;
   const std::string bag = directory.path() / "approach.bag";
-  const std::string file = std::string(PACKAGE_DIR "/config/worlds/") + GetParam() + ".yaml";
-  const std::string command = "'" RECORD_BAG_PATH "' '" + file + "' approach '" + bag + "'";
-  ASSERT_EQ(std::system(command.c_str()), 0) << command;
+  const std::string file = worldFile(GetParam());
+  recordBag(file, "approach", bag);
+  ASSERT_FALSE(HasFatalFailure());
   const sim::World world = sim::readWorld(file);
   const sim::Nomad at_goal(world, sim::NomadParams());
-  StoredView view;
-  view.name = "goal";
-  view.image = sim::SimulatedCamera(world, {}, 77).capture(at_goal.cameraPose());
-  ViewStore(viewsDir("homing")).save(view, true);
+  saveGoal("homing", world, at_goal.cameraPose());
   ASSERT_TRUE(waitForService("point_matcher/set_view"));
   SetView set;
   set.request.view = "goal";
@@ -69,19 +61,11 @@ TEST_P(HomingReplayTest, HeadingsAndArrivalAgreeWithTheTruth)
   std::map<ros::Time, PlanarPose> truth;  // of the goal as seen from the camera
   for (const Frame& frame : framesOf(bag))
   {
-    truth[frame.stamp] = compose(inverse(onFloor(frame.pose)), onFloor(at_goal.cameraPose()));
+    truth[frame.stamp] = compose(inverse(planarPoseOf(frame.pose)), planarPoseOf(at_goal.cameraPose()));
   }
   const Recorder<Heading> headings("heading");
-  {
-    ChildProcess play({ "rosbag", "play", "--clock", "--quiet", playRate(0.6), "--wait-for-subscribers", "--topics",
-                        "/camera/image_raw", "/camera/camera_info", "/odom", "/tf", "/tf_static", "--bags=" + bag });
-    bool played = false;
-    for (int patience = 0; patience < 4 && !played; ++patience)
-    {
-      played = play.exitStatus().has_value();
-    }
-    ASSERT_TRUE(played);
-  }
+  playBag(bag, 0.6, { "/camera/image_raw", "/camera/camera_info", "/odom", "/tf", "/tf_static" });
+  ASSERT_FALSE(HasFatalFailure());
   std::size_t far_images = 0;
   for (const auto& [stamp, goal] : truth)
   {

@@ -5,6 +5,8 @@
 #include "sim/renderer.h"
 #include "sim/world_reader.h"
 #include "sim_ros/robot_messages.h"
+#include "support/matched_views.h"
+#include "support/shipped_files.h"
 
 #include "test_paths.h"
 #include "view_servo/Heading.h"
@@ -12,8 +14,6 @@
 #include "view_servo/LineMatches.h"
 #include "view_servo/PointMatches.h"
 #include "view_servo/geometry/planar_pose.h"
-#include "view_servo/views/point_view_matcher.h"
-#include "view_servo/views/view_store.h"
 
 #include <geometry_msgs/Twist.h>
 #include <tf2_ros/static_transform_broadcaster.h>
@@ -37,7 +37,7 @@ struct Scene
   PlanarPose base;
   std::vector<PointMatch> matches;
 
-  Scene() : world(sim::findWorld("desk", PACKAGE_DIR "/config/worlds"))
+  Scene() : world(sim::readWorld(worldFile("desk")))
   {
     sim::SimulatedCamera camera(world, {}, 1);
     sim::Nomad nomad(world, sim::NomadParams());
@@ -45,12 +45,7 @@ struct Scene
     base = { -0.8, 0.2, 0.05 };
     nomad.setPose(sim::planarPose(base.x, base.y, base.yaw));
     image = camera.capture(nomad.cameraPose());
-    const PointViewMatcher matcher{ PointViewMatcherParams() };
-    matches =
-        toPointMatches(matcher
-                           .match(PreparedImage(view, cv::Rect(), matcher.params().points),
-                                  PreparedImage(image, cv::Rect(), matcher.params().points), GeometryModel::HOMOGRAPHY)
-                           .matches);
+    matches = toPointMatches(matchPoints(PointViewMatcherParams(), view, image).matches);
   }
 };
 
@@ -278,21 +273,21 @@ public:
   }
 };
 
-INSTANTIATE_TYPED_TEST_SUITE_P(Homing, DriverCases, FakeBase);
-INSTANTIATE_TYPED_TEST_SUITE_P(HomingDifferential, DriverCases, FakeDifferentialBase);
+INSTANTIATE_TYPED_TEST_SUITE_P(Homing, EveryDriverTest, FakeBase);
+INSTANTIATE_TYPED_TEST_SUITE_P(HomingDifferential, EveryDriverTest, FakeDifferentialBase);
 
-class HomingTest : public DriverTest<FakeBase>
+class HomingNodeTest : public DriverTest<FakeBase>
 {
 protected:
   using DriverTest<FakeBase>::DriverTest;
-  HomingTest() : DriverTest("driving", "cmd_vel")
+  HomingNodeTest() : DriverTest("driving", "cmd_vel")
   {
   }
 
   Recorder<Heading> headings_{ ns_ + "/heading" };
 };
 
-TEST_F(HomingTest, DrivesTowardsTheView)
+TEST_F(HomingNodeTest, DrivesTowardsTheView)
 {
   drive();
   const PlanarPose truth = inverse(scene().base);
@@ -310,31 +305,25 @@ TEST_F(HomingTest, DrivesTowardsTheView)
   EXPECT_TRUE(waitUntil([this] { return status_.last()->state == ServoStatus::SERVOING; }));
 }
 
-TEST_F(HomingTest, StopsWhenTheCameraStopsAndGoesOnWithIt)
+TEST_F(HomingNodeTest, StopsWhenTheCameraStopsAndGoesOnWithIt)
 {
   drive();
-  expectToStop([this] { robot_.camera = false; }, ServoStatus::LOST, "no image");
-  robot_.camera = true;
-  expectToGoOn();
+  expectToStopWhile(robot_.camera, "no image");
 }
 
-TEST_F(HomingTest, SaysThatItIsTheCalibrationThatStopped)
+TEST_F(HomingNodeTest, SaysThatItIsTheCalibrationThatStopped)
 {
   drive();
-  expectToStop([this] { robot_.infos = false; }, ServoStatus::LOST, "no camera_info comes on '/driving/camera_info'");
-  robot_.infos = true;
-  expectToGoOn();
+  expectToStopWhile(robot_.infos, "no camera_info comes on '/driving/camera_info'");
 }
 
-TEST_F(HomingTest, StopsWhenOdometryStopsAndGoesOnWithIt)
+TEST_F(HomingNodeTest, StopsWhenOdometryStopsAndGoesOnWithIt)
 {
   drive();
-  expectToStop([this] { robot_.moves_odometry = false; }, ServoStatus::LOST, "no odometry");
-  robot_.moves_odometry = true;
-  expectToGoOn();
+  expectToStopWhile(robot_.moves_odometry, "no odometry");
 }
 
-TEST_F(HomingTest, RefusesAndStopsForOdometryOfAnotherTime)
+TEST_F(HomingNodeTest, RefusesAndStopsForOdometryOfAnotherTime)
 {
   drive();
   expectToEnd([this] { robot_.odometry_offset = 2.0; }, GoalState::ABORTED, "after the images on", 2.0 * STOPS_WITHIN);
@@ -345,19 +334,13 @@ TEST_F(HomingTest, RefusesAndStopsForOdometryOfAnotherTime)
   expectToEnd([this] { robot_.odometry_offset = 0.0; }, GoalState::ABORTED, "gone back");
 }
 
-TEST_F(HomingTest, StopsForImagesThatAreOldAsOdometryIs)
+TEST_F(HomingNodeTest, StopsForImagesThatAreOldAsOdometryIs)
 {
   drive();
-  // Gradually, so that time does not go back.
-  const auto delay_more = [this] {
-    robot_.delay = std::min(1.5, robot_.delay + 0.005);
-  };
-  EXPECT_TRUE(waitUntil([this] { return reason().find(" ago, at most 1 s") != std::string::npos; }, delay_more))
-      << reason();
-  EXPECT_TRUE(waitUntil([this] { return !commands_.moving(); }));
+  expectToStopForOldStamps(1.5, " ago, at most 1 s");
 }
 
-TEST_F(HomingTest, DrivesThoughOdometryComesInTheWrongOrder)
+TEST_F(HomingNodeTest, DrivesThoughOdometryComesInTheWrongOrder)
 {
   robot_.shuffles = true;
   drive();
@@ -367,7 +350,7 @@ TEST_F(HomingTest, DrivesThoughOdometryComesInTheWrongOrder)
   EXPECT_EQ(client_.getState().state_, GoalState::ACTIVE) << reason();
 }
 
-TEST_F(HomingTest, StopsForOdometryOfTwoNodes)
+TEST_F(HomingNodeTest, StopsForOdometryOfTwoNodes)
 {
   drive();
   const TemporaryDirectory directory;
@@ -387,7 +370,7 @@ TEST_F(HomingTest, StopsForOdometryOfTwoNodes)
   expectToGoOn();
 }
 
-TEST_F(HomingTest, UsesOdometryOfAFrameThatTfKnows)
+TEST_F(HomingNodeTest, UsesOdometryOfAFrameThatTfKnows)
 {
   drive();
   expectToStop([this] { robot_.setFrames("base_footprint", sim::CAMERA_FRAME); }, ServoStatus::LOST,
@@ -396,14 +379,14 @@ TEST_F(HomingTest, UsesOdometryOfAFrameThatTfKnows)
   expectToGoOn();
 }
 
-TEST_F(HomingTest, KnowsFramesWithASlash)
+TEST_F(HomingNodeTest, KnowsFramesWithASlash)
 {
   robot_.setFrames(std::string("/") + sim::BASE_FRAME, std::string("/") + sim::CAMERA_FRAME);
   drive();
   EXPECT_EQ(client_.getState().state_, GoalState::ACTIVE);
 }
 
-TEST_F(HomingTest, SaysThatImagesHaveNoFrame)
+TEST_F(HomingNodeTest, SaysThatImagesHaveNoFrame)
 {
   robot_.setFrames(sim::BASE_FRAME, "");
   send("goal");
@@ -411,26 +394,22 @@ TEST_F(HomingTest, SaysThatImagesHaveNoFrame)
   EXPECT_FALSE(commands_.moving());
 }
 
-TEST_F(HomingTest, EndsWhenTheBaseDoesNotDoWhatItIsTold)
+TEST_F(HomingNodeTest, EndsWhenTheBaseDoesNotDoWhatItIsTold)
 {
   drive();
   const Clock::time_point moment = Clock::now();
   robot_.blocked = true;
-  const auto final = result();
-  EXPECT_FALSE(final.success);
-  EXPECT_NE(final.message.find("the base does not do what it is told"), std::string::npos) << final.message;
+  expectToFail("the base does not do what it is told");
   EXPECT_LT(commands_.lastMotionAfter(moment), 2.0 + STOPS_WITHIN);
 }
 
-TEST_F(HomingTest, StopsWhenTheImageTurnsBlackAndGoesOnAfterwards)
+TEST_F(HomingNodeTest, StopsWhenTheImageTurnsBlackAndGoesOnAfterwards)
 {
   drive();
-  expectToStop([this] { robot_.black = true; }, ServoStatus::LOST, "shows nothing");
-  robot_.black = false;
-  expectToGoOn();
+  expectToStopWhile(robot_.black, "shows nothing");
 }
 
-TEST_F(HomingTest, NeedsNoMatchesWhileThePointsAreTracked)
+TEST_F(HomingNodeTest, NeedsNoMatchesWhileThePointsAreTracked)
 {
   drive();
   ASSERT_TRUE(waitUntil([this] { return reason().find("points are") != std::string::npos; })) << reason();
@@ -440,37 +419,35 @@ TEST_F(HomingTest, NeedsNoMatchesWhileThePointsAreTracked)
   EXPECT_EQ(status_.last()->state, ServoStatus::SERVOING) << reason();
 }
 
-TEST_F(HomingTest, StopsForMatchesOfAnotherView)
+TEST_F(HomingNodeTest, StopsForMatchesOfAnotherView)
 {
   drive();
   expectToStop([this] { robot_.other_view = true; }, ServoStatus::LOST, "are of view 'another', not of 'goal'");
 }
 
-TEST_F(HomingTest, StopsWithoutACalibration)
+TEST_F(HomingNodeTest, StopsWithoutACalibration)
 {
   drive();
   expectToStop([this] { robot_.calibrated = false; }, ServoStatus::LOST, "not calibrated");
 }
 
-TEST_F(HomingTest, RefusesAStepThatIsNone)
+TEST_F(HomingNodeTest, RefusesAStepThatIsNone)
 {
   HomeToViewGoal goal;
   goal.view = "goal";
   goal.step = -1.0;
   client_.sendGoal(goal);
-  const HomeToViewResult final = result();
-  EXPECT_FALSE(final.success);
-  EXPECT_NE(final.message.find("negative"), std::string::npos) << final.message;
+  const auto final = expectToFail("negative");
   EXPECT_TRUE(std::isnan(final.final.heading));
   send("");
   EXPECT_NE(result().message.find("names no view"), std::string::npos);
 }
 
-class DifferentialHomingTest : public DriverTest<FakeDifferentialBase>
+class DifferentialHomingNodeTest : public DriverTest<FakeDifferentialBase>
 {
 };
 
-TEST_F(DifferentialHomingTest, NeverSlidesAndSaysWhatItDoes)
+TEST_F(DifferentialHomingNodeTest, NeverSlidesAndSaysWhatItDoes)
 {
   const Recorder<HomeToViewActionFeedback> feedback(ns_ + "/home/feedback");
   drive();
@@ -478,18 +455,13 @@ TEST_F(DifferentialHomingTest, NeverSlidesAndSaysWhatItDoes)
   EXPECT_TRUE(commands_.all([](const geometry_msgs::Twist& twist) { return twist.linear.y == 0.0; }));
 }
 
-class DryHomingTest : public DriverTest<FakeBase>
+class DryHomingNodeTest : public DryDriverTest<FakeBase>
 {
 protected:
-  DryHomingTest() : DriverTest("dry", "cmd_vel_dry")
-  {
-  }
-
-  Commands real_commands_{ "dry/cmd_vel" };
   Recorder<Heading> headings_{ "dry/heading" };
 };
 
-TEST_F(DryHomingTest, WatchesItsViewAndKeepsCommandsToItself)
+TEST_F(DryHomingNodeTest, WatchesItsViewAndKeepsCommandsToItself)
 {
   // Without any goal.
   EXPECT_TRUE(waitUntil([this] { return headings_.last() && std::isfinite(headings_.last()->heading); }));
@@ -507,10 +479,6 @@ TEST_F(DryHomingTest, WatchesItsViewAndKeepsCommandsToItself)
 int main(int argc, char** argv)
 {
   using view_servo::test::scene;
-  return view_servo::test::runDriverTests(argc, argv, "homing_test", "driving/homing", [] {
-    view_servo::StoredView view;
-    view.name = "goal";
-    view.image = scene().view;
-    return view;
-  });
+  return view_servo::test::runDriverTests(argc, argv, "homing_test", "driving/homing",
+                                          [] { return view_servo::test::viewOf("goal", scene().view); });
 }

@@ -1,33 +1,21 @@
 // Copyright (c) 2026, the view_servo authors
 // SPDX-License-Identifier: BSD-3-Clause
-#include "child_process.h"
-#include "node_test.h"
-#include "support/temporary_directory.h"
+#include "homography_tracker_test.h"
+#include "support/cameras.h"
 
-#include "test_paths.h"
 #include "view_servo/Homography.h"
-#include "view_servo/SetView.h"
-#include "view_servo/WantedView.h"
 #include "view_servo/geometry/camera_warp.h"
-#include "view_servo/ros/call_service.h"
 #include "view_servo/ros/conversions.h"
-#include "view_servo/views/view_store.h"
 
 #include <gtest/gtest.h>
 #include <sensor_msgs/Image.h>
-#include <std_srvs/Trigger.h>
 #include <opencv2/imgproc.hpp>
 
-#include <atomic>
 #include <cmath>
 #include <cstddef>
-#include <fstream>
 #include <functional>
-#include <mutex>
 #include <optional>
 #include <string>
-#include <thread>
-#include <utility>
 #include <vector>
 
 namespace view_servo
@@ -36,85 +24,6 @@ namespace test
 {
 namespace
 {
-/** A camera that shows a picture at 30 Hz. */
-class RunningCamera
-{
-public:
-  RunningCamera() : camera_("camera")
-  {
-    thread_ = std::thread([this] { run(); });
-  }
-  ~RunningCamera()
-  {
-    running_ = false;
-    thread_.join();
-  }
-  RunningCamera(const RunningCamera&) = delete;
-  RunningCamera& operator=(const RunningCamera&) = delete;
-
-  /** From now on. @return the stamp of the last image before. */
-  ros::Time show(const cv::Mat& picture)
-  {
-    const std::lock_guard<std::mutex> lock(mutex_);
-    picture_ = picture;
-    return last_;
-  }
-
-  /** In one image; then nothing. @return the stamp of the last image before. */
-  ros::Time showOnce(const cv::Mat& picture)
-  {
-    const std::lock_guard<std::mutex> lock(mutex_);
-    picture_ = picture;
-    once_ = true;
-    return last_;
-  }
-
-  /** Shows nothing any more. */
-  void cover()
-  {
-    show(cv::Mat());
-  }
-
-  void set(bool calibrated, double delay, double focal_length = 500.0)
-  {
-    const std::lock_guard<std::mutex> lock(mutex_);
-    camera_.calibrated = calibrated;
-    camera_.focal_length = focal_length;
-    delay_ = delay;
-  }
-
-private:
-  void run()
-  {
-    ros::WallRate rate(30.0);
-    while (running_ && ros::ok())
-    {
-      {
-        const std::lock_guard<std::mutex> lock(mutex_);
-        if (!picture_.empty())
-        {
-          last_ = ros::Time::now() - ros::Duration(delay_);
-          camera_.publish(picture_, last_);
-          if (std::exchange(once_, false))
-          {
-            picture_ = cv::Mat();
-          }
-        }
-      }
-      rate.sleep();
-    }
-  }
-
-  std::mutex mutex_;  // guards what follows
-  FakeCamera camera_;
-  cv::Mat picture_;
-  bool once_ = false;
-  double delay_ = 0.0;  // of stamps [s]
-  ros::Time last_;
-  std::atomic<bool> running_{ true };
-  std::thread thread_;
-};
-
 /** The picture on grey ground, so much smaller, at a place. */
 Eigen::Matrix3d placed(double scale, double u, double v)
 {
@@ -123,156 +32,8 @@ Eigen::Matrix3d placed(double scale, double u, double v)
   return h;
 }
 
-class HomographyTrackerTest : public ::testing::Test
-{
-protected:
-  static void SetUpTestSuite()
-  {
-    const ViewStore store(viewsDir("homography_tracker"));
-    StoredView view;
-    view.name = "goal";
-    view.image = picture();
-    store.save(view, true);
-    view.name = "large";
-    view.image = texturedPicture(1, cv::Size(640, 480));
-    store.save(view, true);
-    view.name = "plain";
-    view.image = cv::Mat(picture().size(), CV_8UC1, cv::Scalar(100));
-    store.save(view, true);
-    view.name = "broken";
-    store.save(view, true);
-    std::ofstream(store.directory() / "broken.yaml") << "image: [";
-  }
-  static void TearDownTestSuite()
-  {
-    removeViews("homography_tracker");
-  }
-
-  void SetUp() override
-  {
-    ASSERT_TRUE(waitForService("homography_tracker/start"));
-    ASSERT_TRUE(waitForService("lost/start"));
-    ASSERT_TRUE(waitUntil([&] { return wanted_.getNumSubscribers() >= 2; }));
-  }
-  void TearDown() override
-  {
-    for (const std::string node : { "homography_tracker", "lost" })
-    {
-      std_srvs::Trigger service;
-      EXPECT_TRUE(callService(node + "/stop", service));
-      EXPECT_TRUE(service.response.success);
-    }
-  }
-
-  static cv::Mat picture()
-  {
-    return texturedPicture(1);
-  }
-  static cv::Mat blank()
-  {
-    return cv::Mat(picture().size(), CV_8UC1, cv::Scalar(40));
-  }
-
-  static SetView::Response start(const std::string& view, const std::string& node = "homography_tracker")
-  {
-    SetView service;
-    service.request.view = view;
-    EXPECT_TRUE(callService(node + "/start", service));
-    return service.response;
-  }
-
-  /** What a driver does. */
-  void want(const std::string& view, const std::string& goal) const
-  {
-    WantedView message;
-    message.header.stamp = ros::Time::now();
-    message.view = view;
-    message.goal = goal;
-    wanted_.publish(message);
-  }
-
-  /** Waits for a message about a goal that is as it should be. */
-  static bool waitForAnswer(const Recorder<Homography>& homographies, const std::string& goal,
-                            const std::function<bool(const Homography&)>& is_right,
-                            const std::function<void()>& step = nullptr)
-  {
-    return waitUntil(
-        [&] {
-          const std::optional<Homography> last = homographies.last();
-          return last && last->goal == goal && is_right(*last);
-        },
-        step);
-  }
-
-  /** Wants a view, and waits until it is refused. */
-  void expectRefusal(const std::string& view, const std::string& goal, const std::string& words) const
-  {
-    SCOPED_TRACE(view);
-    want(view, goal);
-    expectRefusalOf(view, goal, words);
-  }
-
-  void expectRefusalOf(const std::string& view, const std::string& goal, const std::string& words) const
-  {
-    EXPECT_TRUE(waitForAnswer(homographies_, goal, [&](const Homography& message) {
-      return message.refused && message.reason.find(words) != std::string::npos;
-    })) << (homographies_.last() ? homographies_.last()->reason : "no message");
-    const Homography last = *homographies_.last();
-    EXPECT_EQ(last.view, view);
-    EXPECT_EQ(last.state, Homography::SEARCHING);
-    EXPECT_FALSE(last.valid);
-    EXPECT_TRUE(std::isnan(last.h[0]));
-    EXPECT_EQ(last.reason.find('\n'), std::string::npos) << last.reason;
-  }
-
-  /** Waits until images are not answered any more. */
-  bool waitForSilence() const
-  {
-    const Recorder<sensor_msgs::CameraInfo> images("camera/camera_info");
-    return waitUntil([&] {
-      const auto last = images.last();
-      return last && last->header.stamp > homographies_.last()->header.stamp + ros::Duration(0.7);
-    });
-  }
-
-  /** Starts as soon as there are images, and waits until the picture is found where it is. */
-  void follow(const Eigen::Matrix3d& h)
-  {
-    camera_.show(warped(picture(), h));
-    std::string message;
-    ASSERT_TRUE(waitUntil([&] {
-      const SetView::Response response = start("goal");
-      message = response.message;
-      return response.success != 0;
-    })) << message;
-    expectTracking(h);
-  }
-
-  /** Waits for the view where it is, in an image taken after a time. */
-  void expectTracking(const Eigen::Matrix3d& h, const ros::Time& after = ros::Time())
-  {
-    EXPECT_TRUE(waitUntil([&] {
-      const auto last = homographies_.last();
-      return last && last->valid != 0 && last->header.stamp > after && cornerError(toMatrix(last->h), h) < 2.0;
-    })) << (homographies_.last() ? homographies_.last()->reason : "no homography");
-  }
-
-  /** Waits for a homography that is not valid, of an image taken after `stamp`, and says why. */
-  bool waitForReason(const ros::Time& stamp, const std::string& words)
-  {
-    return waitUntil([&] {
-      const auto last = homographies_.last();
-      return last && last->header.stamp > stamp && last->valid == 0 && last->reason.find(words) != std::string::npos;
-    });
-  }
-
-  RunningCamera camera_;
-  Recorder<Homography> homographies_{ "homography_tracker/homography" };
-  const ros::Publisher wanted_ = ros::NodeHandle().advertise<WantedView>("wanted_view", 1, true);
-};
-
 /** As when somebody moves an arm and takes pictures: none is like the one before, and the next one comes late. */
-TEST_F(HomographyTrackerTest, FindsTheViewInSingleImagesFarFromEachOther)
+TEST_F(HomographyTrackerNodeTest, FindsTheViewInSingleImagesFarFromEachOther)
 {
   follow(placed(0.6, 20.0, 20.0));
   camera_.cover();
@@ -284,7 +45,7 @@ TEST_F(HomographyTrackerTest, FindsTheViewInSingleImagesFarFromEachOther)
   }
 }
 
-TEST_F(HomographyTrackerTest, FollowsAView)
+TEST_F(HomographyTrackerNodeTest, FollowsAView)
 {
   follow(exampleHomography());
   const Homography found = *homographies_.last();
@@ -309,7 +70,7 @@ TEST_F(HomographyTrackerTest, FollowsAView)
   }
 }
 
-TEST_F(HomographyTrackerTest, DrawsWhatItFollows)
+TEST_F(HomographyTrackerNodeTest, DrawsWhatItFollows)
 {
   const Recorder<sensor_msgs::Image> overlay("homography_tracker/overlay");
   follow(exampleHomography());
@@ -318,7 +79,7 @@ TEST_F(HomographyTrackerTest, DrawsWhatItFollows)
   EXPECT_EQ(overlay.last()->width, 480u);
 }
 
-TEST_F(HomographyTrackerTest, StopsWhenTold)
+TEST_F(HomographyTrackerNodeTest, StopsWhenTold)
 {
   follow(exampleHomography());
   std_srvs::Trigger service;
@@ -330,7 +91,7 @@ TEST_F(HomographyTrackerTest, StopsWhenTold)
   EXPECT_LT(homographies_.last()->header.stamp, then);
 }
 
-TEST_F(HomographyTrackerTest, RefusesWhatItCannotFollowAndGoesOnWithWhatItFollowed)
+TEST_F(HomographyTrackerNodeTest, RefusesWhatItCannotFollowAndGoesOnWithWhatItFollowed)
 {
   follow(exampleHomography());
   const auto refused = [](const SetView::Response& response, const std::string& words) {
@@ -354,7 +115,7 @@ TEST_F(HomographyTrackerTest, RefusesWhatItCannotFollowAndGoesOnWithWhatItFollow
   expectTracking(exampleHomography());
 }
 
-TEST_F(HomographyTrackerTest, FindsTheViewAgainAfterAnOcclusion)
+TEST_F(HomographyTrackerNodeTest, FindsTheViewAgainAfterAnOcclusion)
 {
   follow(exampleHomography());
   const cv::Mat image = warped(picture(), exampleHomography());
@@ -372,7 +133,7 @@ TEST_F(HomographyTrackerTest, FindsTheViewAgainAfterAnOcclusion)
   expectTracking(exampleHomography());
 }
 
-TEST_F(HomographyTrackerTest, FindsTheViewAnewSomewhereElse)
+TEST_F(HomographyTrackerNodeTest, FindsTheViewAnewSomewhereElse)
 {
   follow(exampleHomography());
   const ros::Time seen = camera_.show(blank());
@@ -382,7 +143,7 @@ TEST_F(HomographyTrackerTest, FindsTheViewAnewSomewhereElse)
   expectTracking(elsewhere);
 }
 
-TEST_F(HomographyTrackerTest, DoesNotFollowAViewThatIsSeenTwice)
+TEST_F(HomographyTrackerNodeTest, DoesNotFollowAViewThatIsSeenTwice)
 {
   const Eigen::Matrix3d left = placed(0.48, 4.0, 90.0);
   const Eigen::Matrix3d right = placed(0.48, 246.0, 90.0);
@@ -402,7 +163,7 @@ TEST_F(HomographyTrackerTest, DoesNotFollowAViewThatIsSeenTwice)
   expectTracking(left);
 }
 
-TEST_F(HomographyTrackerTest, LooksAnewWhenTimeGoesBack)
+TEST_F(HomographyTrackerNodeTest, LooksAnewWhenTimeGoesBack)
 {
   follow(exampleHomography());
   camera_.set(true, 3.0);
@@ -411,7 +172,7 @@ TEST_F(HomographyTrackerTest, LooksAnewWhenTimeGoesBack)
   expectTracking(exampleHomography());
 }
 
-TEST_F(HomographyTrackerTest, FollowsTheViewThatADriverWants)
+TEST_F(HomographyTrackerNodeTest, FollowsTheViewThatADriverWants)
 {
   camera_.show(warped(picture(), exampleHomography()));
   for (const std::string goal : { "goal 1", "goal 2" })
@@ -431,7 +192,7 @@ TEST_F(HomographyTrackerTest, FollowsTheViewThatADriverWants)
   EXPECT_TRUE(waitForAnswer(homographies_, "", [](const Homography& message) { return message.valid != 0; }));
 }
 
-TEST_F(HomographyTrackerTest, NoneFromADriverLeavesAPersonsViewAlone)
+TEST_F(HomographyTrackerNodeTest, NoneFromADriverLeavesAPersonsViewAlone)
 {
   follow(exampleHomography());
   want("", "an old goal");
@@ -441,7 +202,7 @@ TEST_F(HomographyTrackerTest, NoneFromADriverLeavesAPersonsViewAlone)
   EXPECT_EQ(homographies_.last()->view, "goal");
 }
 
-TEST_F(HomographyTrackerTest, RefusesWhatADriverCannotHave)
+TEST_F(HomographyTrackerNodeTest, RefusesWhatADriverCannotHave)
 {
   expectRefusal("unknown", "1", "unknown");
   expectRefusal("../goal", "2", "../goal");
@@ -458,20 +219,15 @@ TEST_F(HomographyTrackerTest, RefusesWhatADriverCannotHave)
   EXPECT_EQ(homographies_.last()->goal, "6");
 }
 
-TEST_F(HomographyTrackerTest, FollowsAViewOfAnotherCamera)
+TEST_F(HomographyTrackerNodeTest, FollowsAViewOfAnotherCamera)
 {
   const Camera here = toCamera(FakeCamera("none").infoOf(picture(), ros::Time()));
-  Camera there;
-  there.width = 600;
-  there.height = 440;
-  there.k << 430.0, 0.0, 305.0, 0.0, 430.0, 215.0, 0.0, 0.0, 1.0;
+  Camera there = pinholeCamera({ 600, 440 }, 430.0, 430.0, 305.0, 215.0);
   there.distortion_model = "equidistant";
   there.distortion.assign(4, 0.0);
-  StoredView view;
-  view.name = "fisheye";
-  view.image = CameraWarp(here, there).image(picture());
+  StoredView view = viewOf("fisheye", CameraWarp(here, there).image(picture()));
   view.camera = there;
-  ViewStore(viewsDir("homography_tracker")).save(view, true);
+  saveView("homography_tracker", view);
   camera_.show(warped(picture(), exampleHomography()));
   want("fisheye", "another camera");
   ASSERT_TRUE(waitForAnswer(homographies_, "another camera", [](const Homography& message) {
@@ -480,7 +236,7 @@ TEST_F(HomographyTrackerTest, FollowsAViewOfAnotherCamera)
   expectTracking(exampleHomography());
 }
 
-TEST_F(HomographyTrackerTest, SaysWhatIsLackingUntilItIsThere)
+TEST_F(HomographyTrackerNodeTest, SaysWhatIsLackingUntilItIsThere)
 {
   const auto waits = [](const std::string& words) {
     return [words](const Homography& message) {
@@ -510,7 +266,7 @@ TEST_F(HomographyTrackerTest, SaysWhatIsLackingUntilItIsThere)
   EXPECT_TRUE(waitForAnswer(homographies_, "early", waits("no image comes on '/camera/image_raw'")));
 }
 
-TEST_F(HomographyTrackerTest, RefusesImagesOfAnotherCalibrationUntilItIsChosenAnew)
+TEST_F(HomographyTrackerNodeTest, RefusesImagesOfAnotherCalibrationUntilItIsChosenAnew)
 {
   camera_.show(picture());
   want("goal", "before");
@@ -525,7 +281,7 @@ TEST_F(HomographyTrackerTest, RefusesImagesOfAnotherCalibrationUntilItIsChosenAn
   EXPECT_TRUE(waitForAnswer(homographies_, "", [](const Homography& message) { return message.valid != 0; }));
 }
 
-TEST_F(HomographyTrackerTest, OutlivesWhatACameraShouldNotSend)
+TEST_F(HomographyTrackerNodeTest, OutlivesWhatACameraShouldNotSend)
 {
   const FakeCamera camera("camera");
   ASSERT_TRUE(camera.waitForSubscribers(2));
@@ -556,78 +312,6 @@ TEST_F(HomographyTrackerTest, OutlivesWhatACameraShouldNotSend)
     SCOPED_TRACE(odd.name);
     camera.publish(odd.image, odd.info);
     ASSERT_TRUE(goes_on()) << homographies_.last()->reason;
-  }
-}
-
-/** Nodes that the test starts itself. */
-class TrackerProcessTest : public HomographyTrackerTest
-{
-protected:
-  std::vector<std::string> command(const std::string& name, const std::vector<std::string>& more = {}) const
-  {
-    std::vector<std::string> words{ HOMOGRAPHY_TRACKER_PATH,
-                                    "__name:=" + name,
-                                    "_odom_frame:=",
-                                    "_views_dir:=" + viewsDir("homography_tracker").string(),
-                                    "image_raw:=camera/image_raw",
-                                    "camera_info:=camera/camera_info" };
-    words.insert(words.end(), more.begin(), more.end());
-    return words;
-  }
-  std::string output() const
-  {
-    return directory_.path() / "output";
-  }
-
-  TemporaryDirectory directory_;
-};
-
-TEST_F(TrackerProcessTest, FollowsWhatWasWantedBeforeItStarted)
-{
-  camera_.show(picture());
-  want("goal", "long ago");
-  const ChildProcess node(command("late"), output());
-  const Recorder<Homography> homographies("late/homography");
-  EXPECT_TRUE(waitForAnswer(homographies, "long ago", [](const Homography& message) { return message.valid != 0; }))
-      << node.output();
-}
-
-TEST_F(TrackerProcessTest, FollowsItsParameterUntilADriverWantsAnother)
-{
-  const ChildProcess node(command("told", { "_view:=unknown" }), output());
-  const Recorder<Homography> homographies("told/homography");
-  EXPECT_TRUE(waitForAnswer(homographies, "", [](const Homography& message) {
-    return message.refused && message.view == "unknown";
-  })) << node.output();
-  camera_.show(picture());
-  want("goal", "goal");
-  EXPECT_TRUE(waitForAnswer(homographies, "goal", [](const Homography& message) { return message.valid != 0; }));
-}
-
-TEST_F(TrackerProcessTest, EndsAtOnceWhileItLooksForTheView)
-{
-  camera_.show(texturedPicture(9));
-  ChildProcess node(command("ending", { "_match_period:=0.001", "_view:=goal" }), output());
-  const Recorder<Homography> homographies("ending/homography");
-  ASSERT_TRUE(waitForAnswer(homographies, "", [](const Homography& message) {
-    return message.reason.find("geometry") != std::string::npos;
-  })) << node.output();
-  const ros::WallTime start_time = ros::WallTime::now();
-  node.interrupt();
-  EXPECT_EQ(node.exitStatus(), 0) << node.output();
-  EXPECT_LT((ros::WallTime::now() - start_time).toSec(), 2.0 * SLOWDOWN);
-}
-
-TEST_F(TrackerProcessTest, ListsAllFaultsOfItsParameters)
-{
-  ChildProcess node(command("faulty", { "_match_period:=0", "_matching/coefficients:=7", "_matching/assignment:=lucky",
-                                        "_tf_patience:=-1", "_matching/max_cornes:=3" }),
-                    output());
-  EXPECT_EQ(node.exitStatus(), 1);
-  for (const char* words : { "~match_period", "coefficients", "~matching/assignment", "~tf_patience",
-                             "~matching/max_cornes", "~matching/max_corners?" })
-  {
-    EXPECT_NE(node.output().find(words), std::string::npos) << words << " is missing in\n" << node.output();
   }
 }
 

@@ -44,28 +44,17 @@ bool isRight(const LineMatch& match, const Eigen::Matrix3d& h)
          place(current.x1, current.y1) < length && place(current.x2, current.y2) > 0.0;
 }
 
-class LineMatcherTest : public MatcherTest<MatchLines>
+class LineMatcherNodeTest : public StreamingMatcherTest<MatchLines, LineMatches>
 {
 protected:
-  LineMatcherTest() : MatcherTest(NODE, texturedPicture(1), warped(texturedPicture(1), exampleHomography()))
+  LineMatcherNodeTest()
+    : StreamingMatcherTest(NODE, "line_matches", texturedPicture(1), warped(texturedPicture(1), exampleHomography()))
   {
-  }
-
-  static void SetUpTestSuite()
-  {
-    ASSERT_TRUE(waitForService(NODE + "/match"));
-    ASSERT_TRUE(waitForService(NODE + "/set_view"));
   }
 
   static void TearDownTestSuite()
   {
     removeViews(NODE);
-  }
-
-  void SetUp() override
-  {
-    ASSERT_TRUE(camera_.waitForSubscribers(1));
-    ASSERT_TRUE(setView("").success);
   }
 
   static void expectLines(const std::vector<LineMatch>& matches, const Eigen::Matrix3d& h = exampleHomography())
@@ -96,21 +85,9 @@ protected:
     EXPECT_TRUE(response.plane_homographies.empty());
     EXPECT_TRUE(toMatrix(response.fundamental).array().isNaN().all());
   }
-
-  /** A frame of the picture now; its stamp is remembered. */
-  void send(const cv::Mat& image)
-  {
-    const ros::Time stamp = ros::Time::now();
-    camera_.publish(image, stamp);
-    sent_.insert(stamp);
-  }
-
-  FakeCamera camera_{ "camera" };
-  Recorder<LineMatches> matches_{ "line_matcher/line_matches" };
-  std::set<ros::Time> sent_;
 };
 
-TEST_F(LineMatcherTest, FindsThePlaneOfTwoFiles)
+TEST_F(LineMatcherNodeTest, FindsThePlaneOfTwoFiles)
 {
   MatchLines::Request request;
   request.reference.path = file("reference.png", picture_);
@@ -141,7 +118,7 @@ TEST_F(LineMatcherTest, FindsThePlaneOfTwoFiles)
   }
 }
 
-TEST_F(LineMatcherTest, MatchesAnImageWithItself)
+TEST_F(LineMatcherNodeTest, MatchesAnImageWithItself)
 {
   MatchLines::Request request = goodRequest();
   request.query = request.reference;
@@ -153,7 +130,7 @@ TEST_F(LineMatcherTest, MatchesAnImageWithItself)
   }
 }
 
-TEST_F(LineMatcherTest, IsRepeatable)
+TEST_F(LineMatcherNodeTest, IsRepeatable)
 {
   const MatchLines::Response first = call(goodRequest());
   const MatchLines::Response second = call(goodRequest());
@@ -162,7 +139,7 @@ TEST_F(LineMatcherTest, IsRepeatable)
   EXPECT_EQ(first.plane_homographies, second.plane_homographies);
 }
 
-TEST_F(LineMatcherTest, TellsPlanesApart)
+TEST_F(LineMatcherNodeTest, TellsPlanesApart)
 {
   // Two planes at different depths, above and below the middle; the camera moved sideways.
   const auto shift = [](double u) {
@@ -194,7 +171,7 @@ TEST_F(LineMatcherTest, TellsPlanesApart)
   EXPECT_NEAR(-(200.0 * line.x() + line.z()) / line.y(), 100.0, 3.0);
 }
 
-TEST_F(LineMatcherTest, DrawsAnOverlayWhenAsked)
+TEST_F(LineMatcherNodeTest, DrawsAnOverlayWhenAsked)
 {
   MatchLines::Request request = goodRequest();
   request.query.image.header.frame_id = "camera_optical_frame";
@@ -208,7 +185,7 @@ TEST_F(LineMatcherTest, DrawsAnOverlayWhenAsked)
   EXPECT_GE(response.overlay.width, 2u * static_cast<unsigned>(picture_.cols));
 }
 
-TEST_F(LineMatcherTest, MatchesStoredViews)
+TEST_F(LineMatcherNodeTest, MatchesStoredViews)
 {
   saveView("wall", picture_);
   saveView("wall_seen", seen_);
@@ -224,7 +201,7 @@ TEST_F(LineMatcherTest, MatchesStoredViews)
   expectPlane(call(request));
 }
 
-TEST_F(LineMatcherTest, FindsNoPlaneInUnrelatedImages)
+TEST_F(LineMatcherNodeTest, FindsNoPlaneInUnrelatedImages)
 {
   MatchLines::Request request = goodRequest();
   request.query.image = toMono8(texturedPicture(7));
@@ -234,7 +211,7 @@ TEST_F(LineMatcherTest, FindsNoPlaneInUnrelatedImages)
   EXPECT_LT(response.matches.size(), 20u);
 }
 
-TEST_F(LineMatcherTest, RefusesBadInputAndGoesOn)
+TEST_F(LineMatcherNodeTest, RefusesBadInputAndGoesOn)
 {
   struct Case
   {
@@ -282,7 +259,7 @@ TEST_F(LineMatcherTest, RefusesBadInputAndGoesOn)
   expectPlane(call(goodRequest()));
 }
 
-TEST_F(LineMatcherTest, StreamsMatchesWithTheView)
+TEST_F(LineMatcherNodeTest, StreamsMatchesWithTheView)
 {
   saveView("wall", picture_);
   EXPECT_FALSE(setView("nobody").success);
@@ -306,7 +283,7 @@ TEST_F(LineMatcherTest, StreamsMatchesWithTheView)
   EXPECT_TRUE(waitUntil([&] { return matches_.last()->matches.empty(); }, [&] { send(blank); }));
 }
 
-TEST_F(LineMatcherTest, PublishesNothingForAnUncalibratedCamera)
+TEST_F(LineMatcherNodeTest, PublishesNothingForAnUncalibratedCamera)
 {
   saveView("wall", picture_);
   ASSERT_TRUE(setView("wall").success);

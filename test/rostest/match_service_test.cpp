@@ -1,6 +1,7 @@
 // Copyright (c) 2026, the view_servo authors
 // SPDX-License-Identifier: BSD-3-Clause
 #include "matcher_test.h"
+#include "support/text_file.h"
 
 #include "view_servo/MatchPoints.h"
 
@@ -8,7 +9,6 @@
 #include <opencv2/imgproc.hpp>
 
 #include <cmath>
-#include <fstream>
 #include <functional>
 #include <limits>
 #include <string>
@@ -47,9 +47,7 @@ protected:
 
   std::string textFile(const std::string& name, const std::string& text) const
   {
-    const std::string path = (directory_.path() / name).string();
-    std::ofstream(path) << text;
-    return path;
+    return writeText(directory_.path() / name, text);
   }
 
   static void expectHomography(const MatchPoints::Response& response)
@@ -192,7 +190,7 @@ TEST_F(MatchServiceTest, MatchesStoredViews)
   request.reference.view = "wall";
   request.query.view = "wall_seen";
   expectHomography(call(request));
-  expectHomography(answer<MatchPoints>(MATCH_WITHOUT_PATHS, request));
+  expectHomography(answerOf<MatchPoints>(MATCH_WITHOUT_PATHS, request));
 
   // The node keeps views in memory; one that is saved anew counts all the same.
   saveView("wall", texturedPicture(2));
@@ -204,8 +202,7 @@ TEST_F(MatchServiceTest, MatchesStoredViews)
 TEST_F(MatchServiceTest, RefusesBadInputAndGoesOn)
 {
   const std::string good = file("reference.png", picture_);
-  std::ofstream((directory_.path() / "half.png").string(), std::ios::binary)
-      << std::string(std::istreambuf_iterator<char>(std::ifstream(good, std::ios::binary).rdbuf()), {}).substr(0, 2000);
+  textFile("half.png", readText(good).substr(0, 2000));
   const std::string mirrored = [&] {
     cv::Mat image;
     cv::flip(picture_, image, 1);
@@ -278,8 +275,8 @@ TEST_F(MatchServiceTest, RefusesFilesWhenPathsAreNotAllowed)
   MatchPoints::Request request = goodRequest();
   request.reference = ImageSource();
   request.reference.path = file("reference.png", picture_);
-  expectRefusal(answer<MatchPoints>(MATCH_WITHOUT_PATHS, request), "~allow_paths");
-  expectHomography(answer<MatchPoints>(MATCH_WITHOUT_PATHS, goodRequest()));
+  expectRefusal(answerOf<MatchPoints>(MATCH_WITHOUT_PATHS, request), "~allow_paths");
+  expectHomography(answerOf<MatchPoints>(MATCH_WITHOUT_PATHS, goodRequest()));
 }
 
 }  // namespace

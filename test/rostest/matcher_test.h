@@ -6,13 +6,16 @@
 #include "support/temporary_directory.h"
 
 #include "view_servo/SetView.h"
-#include "view_servo/ros/call_service.h"
 #include "view_servo/views/view_store.h"
 
 #include <gtest/gtest.h>
+#include <ros/time.h>
+#include <sensor_msgs/CameraInfo.h>
+#include <sensor_msgs/image_encodings.h>
 #include <opencv2/core.hpp>
 #include <opencv2/imgcodecs.hpp>
 
+#include <set>
 #include <string>
 
 namespace view_servo
@@ -53,49 +56,61 @@ protected:
   /** Calls NODE/match. */
   Response call(const Request& request) const
   {
-    return answer<Service>(node_ + "/match", request);
+    return answerOf<Service>(node_ + "/match", request);
   }
 
   SetView::Response setView(const std::string& view) const
   {
     SetView::Request request;
     request.view = view;
-    return answer<SetView>(node_ + "/set_view", request);
-  }
-
-  void save(const StoredView& view) const
-  {
-    ViewStore(viewsDir(node_)).save(view, true);
+    return answerOf<SetView>(node_ + "/set_view", request);
   }
 
   void saveView(const std::string& name, const cv::Mat& image) const
   {
-    StoredView view;
-    view.name = name;
-    view.image = image;
-    save(view);
-  }
-
-  /** Success is denied in one line that holds `naming`. */
-  static void expectFailure(const Response& response, const std::string& naming)
-  {
-    EXPECT_FALSE(response.success);
-    EXPECT_NE(response.message.find(naming), std::string::npos) << response.message << "\ndoes not name " << naming;
-    EXPECT_EQ(response.message.find('\n'), std::string::npos) << response.message;
-  }
-
-  template <typename Called>
-  static typename Called::Response answer(const std::string& service, typename Called::Request request)
-  {
-    typename Called::Response response;
-    EXPECT_TRUE(callService(service, request, response)) << "the node did not answer";
-    return response;
+    test::saveView(node_, viewOf(name, image));
   }
 
   const std::string node_;
   const cv::Mat picture_;
   const cv::Mat seen_;
   TemporaryDirectory directory_;
+};
+
+/** The same of nodes that answer to the camera's images, too; `Message` is what they publish. */
+template <typename Service, typename Message>
+class StreamingMatcherTest : public MatcherTest<Service>
+{
+protected:
+  /** @param topic of the node's own that has its answers. */
+  StreamingMatcherTest(const std::string& node, const std::string& topic, const cv::Mat& reference,
+                       const cv::Mat& current)
+    : MatcherTest<Service>(node, reference, current), matches_(node + "/" + topic)
+  {
+  }
+
+  void SetUp() override
+  {
+    ASSERT_TRUE(waitForService(this->node_ + "/match"));
+    ASSERT_TRUE(waitForService(this->node_ + "/set_view"));
+    ASSERT_TRUE(camera_.waitForSubscribers(1));
+    ASSERT_TRUE(this->setView("").success);
+  }
+
+  /** The camera takes an image now; its stamp is remembered. */
+  void send(const sensor_msgs::CameraInfo& calibration, const cv::Mat& image)
+  {
+    camera_.publish(toImage(image, sensor_msgs::image_encodings::MONO8, calibration.header), calibration);
+    sent_.insert(calibration.header.stamp);
+  }
+  void send(const cv::Mat& image)
+  {
+    send(camera_.infoOf(image, ros::Time::now()), image);
+  }
+
+  FakeCamera camera_{ "camera" };
+  Recorder<Message> matches_;
+  std::set<ros::Time> sent_;
 };
 
 }  // namespace test

@@ -10,7 +10,10 @@
 #include "view_servo/RecognizedViews.h"
 #include "view_servo/SceneMatches.h"
 #include "view_servo/ServoStatus.h"
+#include "view_servo/WantedView.h"
+#include "view_servo/ros/call_service.h"
 #include "view_servo/ros/conversions.h"
+#include "view_servo/views/view_store.h"
 
 #include <gtest/gtest.h>
 #include <ros/callback_queue.h>
@@ -19,10 +22,7 @@
 #include <sensor_msgs/Image.h>
 #include <sensor_msgs/image_encodings.h>
 #include <Eigen/Core>
-#include <Eigen/LU>
 #include <opencv2/core.hpp>
-#include <opencv2/core/eigen.hpp>
-#include <opencv2/imgproc.hpp>
 
 #include <algorithm>
 #include <cmath>
@@ -81,6 +81,24 @@ inline bool waitForService(const std::string& name)
   return waitUntil([&] { return ros::service::exists(name, false); });
 }
 
+/** Calls a service; no answer fails the test, and is a response as it was made. */
+template <typename Service>
+typename Service::Response answerOf(const std::string& service, typename Service::Request request)
+{
+  typename Service::Response response;
+  EXPECT_TRUE(callService(service, request, response)) << service << " did not answer";
+  return response;
+}
+
+/** Expects that success is denied in one line that holds `naming`. */
+template <typename Response>
+void expectFailure(const Response& response, const std::string& naming)
+{
+  EXPECT_FALSE(response.success);
+  EXPECT_NE(response.message.find(naming), std::string::npos) << response.message << "\ndoes not name " << naming;
+  EXPECT_EQ(response.message.find('\n'), std::string::npos) << response.message;
+}
+
 /** Where a node keeps its views. */
 inline std::filesystem::path viewsDir(const std::string& node)
 {
@@ -96,6 +114,31 @@ inline std::filesystem::path viewsDir(const std::string& node)
 inline void removeViews(const std::string& node)
 {
   std::filesystem::remove_all(viewsDir(node));
+}
+
+/** A view with what it must have. */
+inline StoredView viewOf(const std::string& name, const cv::Mat& image)
+{
+  StoredView view;
+  view.name = name;
+  view.image = image;
+  return view;
+}
+
+/** Stores a view where a node keeps them, in place of one of that name. */
+inline void saveView(const std::string& node, const StoredView& view)
+{
+  ViewStore(viewsDir(node)).save(view, true);
+}
+
+/** What a driver says that wants a view for a goal of its own. */
+inline WantedView wantedView(const std::string& view, const std::string& goal)
+{
+  WantedView message;
+  message.header.stamp = ros::Time::now();
+  message.view = view;
+  message.goal = goal;
+  return message;
 }
 
 /** Whether a message says why it holds nothing, or what a driver does: people and drivers are told by its reason. */
@@ -181,10 +224,7 @@ private:
 /** The picture seen through `h`, on grey ground, under another light. */
 inline cv::Mat warped(const cv::Mat& picture, const Eigen::Matrix3d& h)
 {
-  cv::Mat matrix;
-  cv::eigen2cv(h, matrix);
-  cv::Mat result;
-  cv::warpPerspective(picture, result, matrix, picture.size(), cv::INTER_LINEAR, cv::BORDER_CONSTANT, cv::Scalar(120));
+  cv::Mat result = warpedPicture(picture, h);
   result.convertTo(result, -1, 0.8, 12.0);
   return result;
 }

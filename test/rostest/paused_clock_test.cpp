@@ -4,7 +4,6 @@
 
 #include "view_servo/HomeToViewAction.h"
 #include "view_servo/ServoToViewAction.h"
-#include "view_servo/ros/call_service.h"
 
 #include <nav_msgs/Odometry.h>
 #include <rosgraph_msgs/Clock.h>
@@ -49,15 +48,7 @@ protected:
 
     void send(double timeout)
     {
-      ASSERT_TRUE(waitForService(enable_service));
-      ASSERT_TRUE(waitUntil([this] { return client.isServerConnected(); }));
-      std_srvs::SetBool enable;
-      enable.request.data = 1;
-      ASSERT_TRUE(callService(enable_service, enable));
-      typename Action::_action_goal_type::_goal_type goal;
-      goal.view = "goal";
-      goal.timeout = timeout;
-      client.sendGoal(goal);
+      enableAndSend(client, enable_service, "goal", timeout);
     }
 
     actionlib::SimpleActionClient<Action> client;
@@ -118,9 +109,6 @@ TEST_F(PausedClockTest, ServoingGoesOnDeciding)
 int main(int argc, char** argv)
 {
   return view_servo::test::runDriverTests(argc, argv, "paused_clock_test", "homing", [] {
-    view_servo::StoredView view;
-    view.name = "goal";
-    view.image = view_servo::test::texturedPicture(1);
-    return view;
+    return view_servo::test::viewOf("goal", view_servo::test::texturedPicture(1));
   });
 }

@@ -9,11 +9,10 @@
 #include <geometry_msgs/TwistStamped.h>
 #include <sensor_msgs/JointState.h>
 
-#include <algorithm>
 #include <cmath>
-#include <cstdlib>
 #include <limits>
 #include <string>
+#include <vector>
 
 namespace view_servo::sim
 {
@@ -21,10 +20,10 @@ namespace
 {
 using test::waitUntil;
 
-class PumaSimTest : public SimulationTest<sensor_msgs::JointState, geometry_msgs::TwistStamped>
+class PumaSimNodeTest : public SimulationTest<sensor_msgs::JointState, geometry_msgs::TwistStamped>
 {
 protected:
-  PumaSimTest() : SimulationTest("joint_states", BASE_FRAME)
+  PumaSimNodeTest() : SimulationTest("joint_states", BASE_FRAME)
   {
   }
 
@@ -37,10 +36,9 @@ protected:
     waitForFreshTruth();
   }
 
-  double speed() const
+  double speedOf(const sensor_msgs::JointState& joints) const override
   {
     double sum = 0.0;
-    const sensor_msgs::JointState joints = *state_.last();
     for (const double velocity : joints.velocity)
     {
       sum += std::abs(velocity);
@@ -61,12 +59,6 @@ protected:
     message.twist.angular.z = twist(5);
     command_.publish(message);
   }
-
-  void moveFor(double duration, const Puma::Twist& twist, const std::string& frame = CAMERA_FRAME)
-  {
-    const ros::Time end = ros::Time::now() + ros::Duration(duration);
-    ASSERT_TRUE(waitUntil([&] { return state_.last()->header.stamp > end; }, [&] { move(twist, frame); }));
-  }
 };
 
 Puma::Twist twist(double x, double y, double z, double wx, double wy, double wz)
@@ -78,17 +70,9 @@ Puma::Twist twist(double x, double y, double z, double wx, double wy, double wz)
 
 }  // namespace
 
-TEST_F(PumaSimTest, TfAndGroundTruthTellOfOneMotion)
+TEST_F(PumaSimNodeTest, TfAndGroundTruthTellOfOneMotion)
 {
-  const geometry_msgs::PoseStamped start = *truth_.last();
-  const Eigen::Isometry3d tf_start = cameraByTf(start.header.stamp);
-  const Eigen::Vector3d from = cameraByTruth().translation();
-  ASSERT_TRUE(waitUntil([&] { return (cameraByTruth().translation() - from).norm() > 0.04; },
-                        [&] { move(twist(0.02, -0.03, -0.04, 0.03, -0.02, 0.1)); }));
-  waitForFreshTruth();
-  const geometry_msgs::PoseStamped end = *truth_.last();
-  const Eigen::Isometry3d true_motion = toIsometry(start.pose).inverse() * toIsometry(end.pose);
-  const Eigen::Isometry3d tf_motion = tf_start.inverse() * cameraByTf(end.header.stamp);
+  const auto [true_motion, tf_motion] = motionsWhile([&] { move(twist(0.02, -0.03, -0.04, 0.03, -0.02, 0.1)); }, 0.04);
   EXPECT_LT((true_motion.translation() - tf_motion.translation()).norm(), 0.002);
   EXPECT_LT(Eigen::AngleAxisd(true_motion.linear().transpose() * tf_motion.linear()).angle(), 0.005);
   // As commanded, in the optical frame.
@@ -101,33 +85,21 @@ TEST_F(PumaSimTest, TfAndGroundTruthTellOfOneMotion)
   EXPECT_EQ(state_.last()->name.size(), 6U);
 }
 
-TEST_F(PumaSimTest, StandsAQuarterOfASecondAfterTheLastCommand)
+TEST_F(PumaSimNodeTest, StandsAQuarterOfASecondAfterTheLastCommand)
 {
-  ASSERT_TRUE(waitUntil([&] { return speed() > 0.05; }, [&] { move(twist(0.0, 0.0, -0.05, 0.0, 0.0, 0.2)); }));
-  move(twist(0.0, 0.0, -0.05, 0.0, 0.0, 0.2));
-  const ros::WallTime last = ros::WallTime::now();
-  ASSERT_TRUE(waitUntil([&] { return speed() == 0.0; }));
-  for (const sensor_msgs::JointState& message : state_.messages())
-  {
-    const double after = message.header.stamp.toSec() - last.toSec();
-    if (after > 0.25)
-    {
-      EXPECT_TRUE(std::all_of(message.velocity.begin(), message.velocity.end(), [](double v) { return v == 0.0; }))
-          << after << " s after the last command";
-    }
-  }
+  expectToStandAfter([&] { move(twist(0.0, 0.0, -0.05, 0.0, 0.0, 0.2)); }, 0.05);
 }
 
-TEST_F(PumaSimTest, RefusesCommandsThatAreNotFiniteOrInAnotherFrame)
+TEST_F(PumaSimNodeTest, RefusesCommandsThatAreNotFiniteOrInAnotherFrame)
 {
   const Eigen::Isometry3d before = cameraByTruth();
-  moveFor(0.4, twist(std::numeric_limits<double>::quiet_NaN(), 0.0, 0.0, 0.0, 0.0, 0.1));
-  moveFor(0.4, twist(0.0, 0.0, -0.05, 0.0, 0.0, 0.0), "base_link");
+  moveFor(0.4, [&] { move(twist(std::numeric_limits<double>::quiet_NaN(), 0.0, 0.0, 0.0, 0.0, 0.1)); });
+  moveFor(0.4, [&] { move(twist(0.0, 0.0, -0.05, 0.0, 0.0, 0.0), "base_link"); });
   waitForFreshTruth();
   EXPECT_TRUE(cameraByTruth().isApprox(before, 1e-9));
 }
 
-TEST_F(PumaSimTest, GoesToPosesWithinReachOnly)
+TEST_F(PumaSimNodeTest, GoesToPosesWithinReachOnly)
 {
   const Eigen::Isometry3d before = cameraByTruth();
   Eigen::Isometry3d near = before;
@@ -146,14 +118,12 @@ TEST_F(PumaSimTest, GoesToPosesWithinReachOnly)
   EXPECT_TRUE(cameraByTruth().isApprox(near, 1e-5));
 }
 
-TEST_F(PumaSimTest, NodesRefuseBadParameters)
+TEST_F(PumaSimNodeTest, RefusesToStartWithBadParameters)
 {
-  const std::string node = PUMA_SIM_PATH;
-  for (const std::string arguments :
-       { " _world:=desk", " _world:=rice _start:=nowhere", " _world:=rice _encoder_noise:=-1.0" })
+  for (const std::vector<std::string>& arguments : std::vector<std::vector<std::string>>{
+           { "_world:=desk" }, { "_world:=rice", "_start:=nowhere" }, { "_world:=rice", "_encoder_noise:=-1.0" } })
   {
-    const int status = std::system((node + " __name:=refused" + arguments + " 2> /dev/null").c_str());
-    EXPECT_EQ(WEXITSTATUS(status), 1) << arguments;
+    expectRefusedStart(PUMA_SIM_PATH, arguments);
   }
 }
 

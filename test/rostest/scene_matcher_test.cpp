@@ -23,29 +23,17 @@ namespace
 {
 const std::string NODE = "scene_matcher";
 
-class SceneMatcherTest : public MatcherTest<MatchScene>
+class SceneMatcherNodeTest : public StreamingMatcherTest<MatchScene, SceneMatches>
 {
 protected:
-  explicit SceneMatcherTest(const RoomCorner& room = RoomCorner())
-    : MatcherTest(NODE, room.reference, room.current), room_(room)
+  explicit SceneMatcherNodeTest(const RoomCorner& room = RoomCorner())
+    : StreamingMatcherTest(NODE, "scene_matches", room.reference, room.current), room_(room)
   {
-  }
-
-  static void SetUpTestSuite()
-  {
-    ASSERT_TRUE(waitForService(NODE + "/match"));
-    ASSERT_TRUE(waitForService(NODE + "/set_view"));
   }
 
   static void TearDownTestSuite()
   {
     removeViews(NODE);
-  }
-
-  void SetUp() override
-  {
-    ASSERT_TRUE(camera_.waitForSubscribers(1));
-    ASSERT_TRUE(setView("").success);
   }
 
   /** The calibration of the camera that took the pictures of the room. */
@@ -59,18 +47,14 @@ protected:
 
   void saveView(const std::string& name, const cv::Mat& image) const
   {
-    StoredView view;
-    view.name = name;
-    view.image = image;
+    StoredView view = viewOf(name, image);
     view.camera = toCamera(info(image));
-    save(view);
+    test::saveView(NODE, view);
   }
 
   void send(const cv::Mat& image)
   {
-    const sensor_msgs::CameraInfo calibration = info(image);
-    camera_.publish(toImage(image, sensor_msgs::image_encodings::MONO8, calibration.header), calibration);
-    sent_.insert(calibration.header.stamp);
+    StreamingMatcherTest::send(info(image), image);
   }
 
   template <typename Fields>
@@ -124,12 +108,9 @@ protected:
   }
 
   const RoomCorner room_;
-  FakeCamera camera_{ "camera" };
-  Recorder<SceneMatches> matches_{ "scene_matcher/scene_matches" };
-  std::set<ros::Time> sent_;
 };
 
-TEST_F(SceneMatcherTest, FindsTheFundamentalMatrixOfTwoFiles)
+TEST_F(SceneMatcherNodeTest, FindsTheFundamentalMatrixOfTwoFiles)
 {
   MatchScene::Request request;
   request.reference.path = file("reference.png", picture_);
@@ -152,7 +133,7 @@ TEST_F(SceneMatcherTest, FindsTheFundamentalMatrixOfTwoFiles)
   EXPECT_TRUE(uncalibrated.overlay.data.empty());
 }
 
-TEST_F(SceneMatcherTest, TellsTheMotionBetweenStoredViews)
+TEST_F(SceneMatcherNodeTest, TellsTheMotionBetweenStoredViews)
 {
   saveView("room", room_.reference);
   saveView("room_seen", room_.current);
@@ -166,10 +147,10 @@ TEST_F(SceneMatcherTest, TellsTheMotionBetweenStoredViews)
   expectMotion(response);
 }
 
-TEST_F(SceneMatcherTest, FindsAPlane)
+TEST_F(SceneMatcherNodeTest, FindsAPlane)
 {
   MatchScene::Request request = goodRequest();
-  request.query.image = toMono8(viewThrough(room_.reference, exampleHomography()));
+  request.query.image = toMono8(warpedPicture(room_.reference, exampleHomography()));
   for (const char* model : { "", "homography" })
   {
     SCOPED_TRACE(model);
@@ -183,7 +164,7 @@ TEST_F(SceneMatcherTest, FindsAPlane)
   }
 }
 
-TEST_F(SceneMatcherTest, RefusesBadInputAndGoesOn)
+TEST_F(SceneMatcherNodeTest, RefusesBadInputAndGoesOn)
 {
   struct Case
   {
@@ -221,7 +202,7 @@ TEST_F(SceneMatcherTest, RefusesBadInputAndGoesOn)
   EXPECT_TRUE(call(goodRequest()).success);
 }
 
-TEST_F(SceneMatcherTest, StreamsGeometryWithTheView)
+TEST_F(SceneMatcherNodeTest, StreamsGeometryWithTheView)
 {
   saveView("room", room_.reference);
   EXPECT_FALSE(setView("nobody").success);

@@ -5,8 +5,6 @@
 #include "view_servo/MatchPoints.h"
 #include "view_servo/PointMatches.h"
 #include "view_servo/SetView.h"
-#include "view_servo/ros/call_service.h"
-#include "view_servo/views/view_store.h"
 
 #include <gtest/gtest.h>
 #include <rosgraph_msgs/Clock.h>
@@ -33,10 +31,7 @@ protected:
     clock_ = ros::NodeHandle().advertise<rosgraph_msgs::Clock>("/clock", 1);
     ASSERT_TRUE(waitForService("point_matcher/match"));
     ASSERT_TRUE(camera_.waitForSubscribers(1));
-    StoredView view;
-    view.name = "wall";
-    view.image = picture_;
-    ViewStore(viewsDir("point_matcher")).save(view, true);
+    saveView("point_matcher", viewOf("wall", picture_));
   }
 
   void play(double seconds, bool image)
@@ -55,9 +50,20 @@ protected:
   {
     MatchPoints::Request request;
     request.reference.view = "wall";
+    return answerOf<MatchPoints>("point_matcher/match", request);
+  }
+
+  /** Lets the camera take images from a time on [s], until one is matched. */
+  void playUntilMatched(double& now)
+  {
     MatchPoints::Response response;
-    EXPECT_TRUE(callService("point_matcher/match", request, response));
-    return response;
+    EXPECT_TRUE(waitUntil(
+        [&] {
+          response = match();
+          return response.success != 0;
+        },
+        [&] { play(now += 0.1, true); }))
+        << response.message;
   }
 
   ros::Publisher clock_;
@@ -72,25 +78,18 @@ TEST_F(SimTimeTest, ServesBeforeTheClockStarts)
   MatchPoints::Request request;
   request.reference.view = "wall";
   request.query.image = toMono8(seen_);
-  MatchPoints::Response response;
-  ASSERT_TRUE(callService("point_matcher/match", request, response));
+  const MatchPoints::Response response = answerOf<MatchPoints>("point_matcher/match", request);
   EXPECT_TRUE(response.success) << response.message;
 }
 
 TEST_F(SimTimeTest, ForgetsTheFutureWhenTimeJumpsBack)
 {
   double now = 1000.0;
-  MatchPoints::Response response;
-  EXPECT_TRUE(waitUntil(
-      [&] {
-        response = match();
-        return static_cast<bool>(response.success);
-      },
-      [&] { play(now += 0.1, true); }))
-      << response.message;
+  playUntilMatched(now);
 
   // The bag starts again: the last image is one of the future until the camera has sent another.
   now = 10.0;
+  MatchPoints::Response response;
   EXPECT_TRUE(waitUntil(
       [&] {
         response = match();
@@ -98,22 +97,14 @@ TEST_F(SimTimeTest, ForgetsTheFutureWhenTimeJumpsBack)
       },
       [&] { play(now += 0.001, false); }));
   EXPECT_NE(response.message.find("future"), std::string::npos) << response.message;
-
-  EXPECT_TRUE(waitUntil(
-      [&] {
-        response = match();
-        return static_cast<bool>(response.success);
-      },
-      [&] { play(now += 0.1, true); }))
-      << response.message;
+  playUntilMatched(now);
 }
 
 TEST_F(SimTimeTest, StreamsOnAfterTimeJumpsBack)
 {
   SetView::Request request;
   request.view = "wall";
-  SetView::Response response;
-  ASSERT_TRUE(callService("point_matcher/set_view", request, response));
+  ASSERT_TRUE(answerOf<SetView>("point_matcher/set_view", request).success);
   const Recorder<PointMatches> matches("point_matcher/point_matches");
   double now = 2000.0;
   EXPECT_TRUE(waitUntil([&] { return matches.last() && matches.last()->header.stamp > ros::Time(2000.0); },

@@ -4,6 +4,7 @@
 
 #include "node_test.h"
 #include "sim_ros/robot_messages.h"
+#include "support/program_run.h"
 
 #include <geometry_msgs/Pose.h>
 #include <geometry_msgs/PoseStamped.h>
@@ -14,7 +15,9 @@
 #include <tf2_ros/transform_listener.h>
 #include <Eigen/Geometry>
 
+#include <functional>
 #include <string>
+#include <vector>
 
 namespace view_servo::sim
 {
@@ -27,6 +30,14 @@ protected:
   SimulationTest(const std::string& state_topic, const std::string& base)
     : state_(state_topic), listener_(tf_), command_(nh_.advertise<Command>("cmd_vel", 1)), base_(base)
   {
+  }
+
+  /** How fast the robot is by its state; 0 only when all of it stands. */
+  virtual double speedOf(const State& state) const = 0;
+
+  double speed() const
+  {
+    return speedOf(*state_.last());
   }
 
   /** Until all that the robot publishes has come, and it takes commands. */
@@ -54,6 +65,58 @@ protected:
     pose.position.z = transform.translation.z;
     pose.orientation = transform.rotation;
     return toIsometry(pose);
+  }
+
+  /** How the camera moves while `move` is commanded until it is so far away [m]: by the truth, and by tf. */
+  struct Motions
+  {
+    Eigen::Isometry3d by_truth;
+    Eigen::Isometry3d by_tf;
+  };
+  Motions motionsWhile(const std::function<void()>& move, double distance)
+  {
+    const geometry_msgs::PoseStamped start = *truth_.last();
+    const Eigen::Isometry3d tf_start = cameraByTf(start.header.stamp);
+    const Eigen::Vector3d from = cameraByTruth().translation();
+    EXPECT_TRUE(test::waitUntil([&] { return (cameraByTruth().translation() - from).norm() > distance; }, move));
+    waitForFreshTruth();
+    const geometry_msgs::PoseStamped end = *truth_.last();
+    EXPECT_EQ(end.header.frame_id, "world");
+    return { toIsometry(start.pose).inverse() * toIsometry(end.pose),
+             tf_start.inverse() * cameraByTf(end.header.stamp) };
+  }
+
+  /** Commands `move` until the robot is so fast, and no more: it must stand within a quarter of a second. */
+  void expectToStandAfter(const std::function<void()>& move, double fast)
+  {
+    ASSERT_TRUE(test::waitUntil([&] { return speed() > fast; }, move));
+    move();
+    const ros::WallTime last = ros::WallTime::now();
+    ASSERT_TRUE(test::waitUntil([&] { return speed() == 0.0; }));
+    // Its own stamp says when it stood, however late the message came.
+    for (const State& state : state_.messages())
+    {
+      const double after = state.header.stamp.toSec() - last.toSec();
+      if (after > 0.25)
+      {
+        EXPECT_EQ(speedOf(state), 0.0) << after << " s after the last command";
+      }
+    }
+  }
+
+  /** Commands `move` until that much time has passed on the robot's stamps [s]. */
+  void moveFor(double duration, const std::function<void()>& move)
+  {
+    const ros::Time end = ros::Time::now() + ros::Duration(duration);
+    ASSERT_TRUE(test::waitUntil([&] { return state_.last()->header.stamp > end; }, move));
+  }
+
+  /** The node's program must end with status 1 when it is started with these arguments. */
+  static void expectRefusedStart(const std::string& program, const std::vector<std::string>& arguments)
+  {
+    std::vector<std::string> all{ "__name:=refused" };
+    all.insert(all.end(), arguments.begin(), arguments.end());
+    EXPECT_EQ(test::runProgram(program, all).status, 1) << arguments.back();
   }
 
   Eigen::Isometry3d cameraByTruth() const

@@ -2,6 +2,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "node_test.h"
 #include "store_from_camera.h"
+#include "support/text_file.h"
 
 #include "view_servo/DeleteView.h"
 #include "view_servo/MatchPoints.h"
@@ -21,7 +22,6 @@
 #include <cmath>
 #include <cstddef>
 #include <filesystem>
-#include <fstream>
 #include <functional>
 #include <optional>
 #include <set>
@@ -51,11 +51,7 @@ protected:
     /** What a driver does. */
     void want(const std::string& view, const std::string& goal) const
     {
-      WantedView message;
-      message.header.stamp = ros::Time::now();
-      message.view = view;
-      message.goal = goal;
-      wanted.publish(message);
+      wanted.publish(wantedView(view, goal));
     }
 
     /** Whether the last answer is about a view and a goal. */
@@ -92,9 +88,7 @@ protected:
     template <typename Service>
     typename Service::Response call(const std::string& service, typename Service::Request request) const
     {
-      typename Service::Response response;
-      EXPECT_TRUE(callService(name + "/" + service, request, response)) << service << " did not answer";
-      return response;
+      return answerOf<Service>(name + "/" + service, request);
     }
 
     SetView::Response setView(const std::string& view) const
@@ -381,7 +375,7 @@ TEST_F(StreamingTest, RefusesAViewThatCannotBeMatched)
   EXPECT_LT(std::abs((ros::Time::now() - left_.matches.last()->header.stamp).toSec()), 10.0);
   left_.expectRefusal("../wall", "name", "../wall");
   left_.teach("broken", picture_);
-  std::ofstream(views / "broken.yaml") << "image: [";
+  writeText(views / "broken.yaml", "image: [");
   left_.expectRefusal("broken", "damaged", "broken");
   const auto send = [&] {
     left_.send(seen_);

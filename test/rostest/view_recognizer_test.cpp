@@ -1,7 +1,6 @@
 // Copyright (c) 2026, the view_servo authors
 // SPDX-License-Identifier: BSD-3-Clause
 #include "node_test.h"
-#include "support/room_corner.h"
 
 #include "view_servo/RecognizeView.h"
 #include "view_servo/RecognizedViews.h"
@@ -60,10 +59,7 @@ protected:
 
   static void saveView(const std::string& name, const cv::Mat& image)
   {
-    StoredView view;
-    view.name = name;
-    view.image = image;
-    store().save(view, true);
+    test::saveView(NODE, viewOf(name, image));
   }
 
   static RecognizeView::Request requestOf(const cv::Mat& image)
@@ -76,15 +72,13 @@ protected:
 
   static RecognizeView::Response call(RecognizeView::Request request)
   {
-    RecognizeView::Response response;
-    EXPECT_TRUE(callService(NODE + "/recognize", request, response)) << "the node did not answer";
-    return response;
+    return answerOf<RecognizeView>(NODE + "/recognize", request);
   }
 
   /** What a camera elsewhere sees of the picture of a view. */
   static cv::Mat seen(int i)
   {
-    return viewThrough(texturedPicture(pictureOf(i)), exampleHomography());
+    return warpedPicture(texturedPicture(pictureOf(i)), exampleHomography());
   }
 };
 
@@ -158,14 +152,14 @@ TEST_F(ViewRecognizerNodeTest, RefusesBadRequestsAndGoesOn)
 
 TEST_F(ViewRecognizerNodeTest, KnowsWhatWasSavedChangedAndDeletedAMomentAgo)
 {
-  const cv::Mat image = viewThrough(texturedPicture(50), exampleHomography());
+  const cv::Mat image = warpedPicture(texturedPicture(50), exampleHomography());
   EXPECT_FALSE(call(requestOf(image)).success);
   saveView("guest", texturedPicture(50));
   EXPECT_EQ(call(requestOf(image)).views.at(0).view, "guest");
   saveView("guest", texturedPicture(51));
   EXPECT_FALSE(call(requestOf(image)).success);
   store().remove("guest");
-  EXPECT_FALSE(call(requestOf(viewThrough(texturedPicture(51), exampleHomography()))).success);
+  EXPECT_FALSE(call(requestOf(warpedPicture(texturedPicture(51), exampleHomography()))).success);
   // Beside the views, for the node's next start.
   EXPECT_TRUE(waitUntil([] { return std::filesystem::exists(store().directory() / "views.index"); }));
 }

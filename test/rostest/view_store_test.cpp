@@ -2,6 +2,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "node_test.h"
 #include "support/temporary_directory.h"
+#include "support/text_file.h"
 
 #include "view_servo/DeleteView.h"
 #include "view_servo/GetView.h"
@@ -17,7 +18,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <fstream>
 #include <string>
 #include <vector>
 
@@ -47,9 +47,7 @@ protected:
   template <typename Service>
   static typename Service::Response call(const std::string& service, typename Service::Request request)
   {
-    typename Service::Response response;
-    EXPECT_TRUE(callService("view_store/" + service, request, response)) << service << " did not answer";
-    return response;
+    return answerOf<Service>("view_store/" + service, request);
   }
 
   static GetView::Response get(const std::string& name)
@@ -66,13 +64,6 @@ protected:
     request.overwrite = true;
     request.source.image = toMono8(picture_);
     return request;
-  }
-
-  static void expectRefusal(const SaveView::Response& response, const std::string& naming)
-  {
-    EXPECT_FALSE(response.success);
-    EXPECT_NE(response.message.find(naming), std::string::npos) << response.message << "\ndoes not name " << naming;
-    EXPECT_EQ(response.message.find('\n'), std::string::npos) << response.message;
   }
 
   FakeCamera camera_{ "camera" };
@@ -192,7 +183,7 @@ TEST_F(ViewStoreNodeTest, OverwritesOnlyWhenAsked)
   SaveView::Request request = imageRequest("once");
   request.source.image = toMono8(texturedPicture(2));
   request.overwrite = false;
-  expectRefusal(call<SaveView>("save", request), "once");
+  expectFailure(call<SaveView>("save", request), "once");
   EXPECT_EQ(get("once").image.data, toMono8(picture_).data);
   request.overwrite = true;
   ASSERT_TRUE(call<SaveView>("save", request).success);
@@ -203,7 +194,7 @@ TEST_F(ViewStoreNodeTest, ReportsADamagedViewByNameAndKeepsTheOthers)
 {
   ASSERT_TRUE(call<SaveView>("save", imageRequest("sound")).success);
   ASSERT_TRUE(call<SaveView>("save", imageRequest("broken")).success);
-  std::ofstream(viewsDir("view_store") / "broken.yaml") << "image: [";
+  writeText(viewsDir("view_store") / "broken.yaml", "image: [");
 
   const ListViews::Response listing = call<ListViews>("list", {});
   EXPECT_TRUE(listing.success);
@@ -229,32 +220,32 @@ TEST_F(ViewStoreNodeTest, RefusesBadRequestsAndGoesOn)
   for (const char* name : { "", "../up", "a/b", ".hidden", "with space", "-dash" })
   {
     SCOPED_TRACE(name);
-    expectRefusal(call<SaveView>("save", imageRequest(name)), name);
+    expectFailure(call<SaveView>("save", imageRequest(name)), name);
     EXPECT_FALSE(get(name).success);
     DeleteView::Request request;
     request.name = name;
     EXPECT_FALSE(call<DeleteView>("delete", request).success);
   }
-  expectRefusal(call<SaveView>("save", imageRequest(std::string(65, 'a'))), "64");
+  expectFailure(call<SaveView>("save", imageRequest(std::string(65, 'a'))), "64");
 
   SaveView::Request request = imageRequest("never");
   request.source.path = "/nowhere/picture.png";
-  expectRefusal(call<SaveView>("save", request), "path and image");
+  expectFailure(call<SaveView>("save", request), "path and image");
 
   request = imageRequest("never");
   request.source = ImageSource();
   request.source.path = "/nowhere/picture.png";
-  expectRefusal(call<SaveView>("save", request), "/nowhere/picture.png");
+  expectFailure(call<SaveView>("save", request), "/nowhere/picture.png");
 
   request = imageRequest("never");
   request.roi.x_offset = 400;
   request.roi.width = 100;
   request.roi.height = 100;
-  expectRefusal(call<SaveView>("save", request), "roi");
+  expectFailure(call<SaveView>("save", request), "roi");
 
   request = imageRequest("never");
   request.source.image.encoding = "h264";
-  expectRefusal(call<SaveView>("save", request), "h264");
+  expectFailure(call<SaveView>("save", request), "h264");
 
   EXPECT_FALSE(get("never").success);
   EXPECT_NE(get("never").message.find("never"), std::string::npos);
@@ -274,7 +265,7 @@ TEST_F(ViewStoreNodeTest, RefusesToStoreAnUncalibratedCamera)
       },
       [&] { camera_.publish(picture_, ros::Time::now()); }))
       << response.message;
-  expectRefusal(response, "/camera/camera_info");
+  expectFailure(response, "/camera/camera_info");
   EXPECT_FALSE(get("never").success);
 }
 

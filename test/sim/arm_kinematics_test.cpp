@@ -2,14 +2,13 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "sim/arm_kinematics.h"
 
-#include "test_paths.h"
+#include "support/shipped_files.h"
+#include "support/text_file.h"
 #include "view_servo/robust/random.h"
 
 #include <gtest/gtest.h>
 
 #include <cmath>
-#include <fstream>
-#include <iterator>
 #include <limits>
 #include <optional>
 #include <stdexcept>
@@ -21,6 +20,7 @@ namespace
 {
 using Joints = ArmKinematics::Joints;
 using Twist = ArmKinematics::Twist;
+using test::pumaUrdf;
 
 constexpr double ACCURACY = 1e-6;  // [m, rad]
 constexpr double DEGREE = M_PI / 180.0;
@@ -28,20 +28,10 @@ constexpr double DEGREE = M_PI / 180.0;
 /** Well within all limits and away from singularities. */
 const Joints FORWARD = (Joints() << 0.0, 0.9, -3.05, 0.0, 0.579204, 0.0).finished();
 
-std::string urdf()
-{
-  std::ifstream file(PACKAGE_DIR "/urdf/puma560.urdf");
-  return std::string(std::istreambuf_iterator<char>(file), {});
-}
-
 /** The URDF with the first joint kept within an angle of 0. */
 std::string urdfWithNarrowFirstJoint(double angle)
 {
-  std::string text = urdf();
-  const std::string limit = "lower=\"-2.7925\" upper=\"2.7925\"";
-  const std::size_t at = text.find(limit);
-  EXPECT_NE(at, std::string::npos);
-  return text.replace(at, limit.size(),
+  return test::edited(pumaUrdf(), "lower=\"-2.7925\" upper=\"2.7925\"",
                       "lower=\"-" + std::to_string(angle) + "\" upper=\"" + std::to_string(angle) + "\"");
 }
 
@@ -71,7 +61,7 @@ void expectWithinLimits(const ArmKinematics& arm, const Joints& joints)
 
 TEST(ArmKinematics, InverseReachesRandomPosesWithinTheLimits)
 {
-  const ArmKinematics arm(urdf(), {});
+  const ArmKinematics arm(pumaUrdf(), {});
   Rng rng(1);
   for (int i = 0; i < 60; ++i)
   {
@@ -85,7 +75,7 @@ TEST(ArmKinematics, InverseReachesRandomPosesWithinTheLimits)
 
 TEST(ArmKinematics, InverseFindsTheSolutionNextToWhereItStarts)
 {
-  const ArmKinematics arm(urdf(), {});
+  const ArmKinematics arm(pumaUrdf(), {});
   Rng rng(2);
   for (int i = 0; i < 20; ++i)
   {
@@ -100,7 +90,7 @@ TEST(ArmKinematics, InverseFindsTheSolutionNextToWhereItStarts)
 TEST(ArmKinematics, InverseTurnsTheLastJointTheShorterWay)
 {
   // Its range is larger than a full turn, so that two angles give the same pose.
-  const ArmKinematics arm(urdf(), {});
+  const ArmKinematics arm(pumaUrdf(), {});
   Joints joints = FORWARD;
   joints(5) = 4.0;
   Joints near = FORWARD;
@@ -115,7 +105,7 @@ TEST(ArmKinematics, InverseTurnsTheLastJointTheShorterWay)
 
 TEST(ArmKinematics, InverseHasNoSolutionOutOfReach)
 {
-  const ArmKinematics arm(urdf(), {});
+  const ArmKinematics arm(pumaUrdf(), {});
   const Eigen::Isometry3d reachable = arm.pose(FORWARD);
   ASSERT_TRUE(arm.inverse(reachable, Joints::Zero()));
   Rng rng(3);
@@ -134,7 +124,7 @@ TEST(ArmKinematics, InverseHasNoSolutionOutOfReach)
 
 TEST(ArmKinematics, InverseHasNoSolutionForWhatIsNoRotation)
 {
-  const ArmKinematics arm(urdf(), {});
+  const ArmKinematics arm(pumaUrdf(), {});
   Eigen::Isometry3d mirrored = arm.pose(FORWARD);
   mirrored.linear().col(0) *= -1.0;
   EXPECT_FALSE(arm.inverse(mirrored, FORWARD));
@@ -146,7 +136,7 @@ TEST(ArmKinematics, InverseHasNoSolutionForWhatIsNoRotation)
 TEST(ArmKinematics, InverseKeepsTheLimits)
 {
   // Nothing but the first joint turns the arm about the vertical, and it is kept within 10 degrees.
-  const ArmKinematics free(urdf(), {});
+  const ArmKinematics free(pumaUrdf(), {});
   const ArmKinematics narrow(urdfWithNarrowFirstJoint(10.0 * DEGREE), {});
   EXPECT_NEAR(narrow.upper()(0), 10.0 * DEGREE, 1e-6);
   for (const double angle : { -60.0, -9.0, 0.0, 9.0, 11.0, 60.0 })
@@ -166,7 +156,7 @@ TEST(ArmKinematics, InverseKeepsTheLimits)
 
 TEST(ArmKinematics, JointVelocitiesFollowATwist)
 {
-  const ArmKinematics arm(urdf(), {});
+  const ArmKinematics arm(pumaUrdf(), {});
   Rng rng(4);
   for (int i = 0; i < 20; ++i)
   {
@@ -187,7 +177,7 @@ TEST(ArmKinematics, JointVelocitiesFollowATwist)
 
 TEST(ArmKinematics, VelocityLimitsSlowAllJointsDownAlike)
 {
-  const ArmKinematics arm(urdf(), {});
+  const ArmKinematics arm(pumaUrdf(), {});
   Joints velocities = Joints::Constant(0.1);
   EXPECT_EQ(arm.withinVelocityLimits(velocities).factor, 1.0);
   velocities(2) = -4.26;  // its limit is 2.13 rad/s
@@ -200,7 +190,7 @@ TEST(ArmKinematics, LeavesRoomToStopBeforeTheEnds)
 {
   constexpr double DT = 0.002;          // [s]
   constexpr double ACCELERATION = 2.0;  // [rad/s²]
-  const ArmKinematics arm(urdf(), {});
+  const ArmKinematics arm(pumaUrdf(), {});
   Joints velocities = Joints::Zero();
   velocities(1) = -0.5;
   EXPECT_EQ(arm.beforeEnds(FORWARD, velocities, DT, ACCELERATION).factor, 1.0);
@@ -218,7 +208,7 @@ TEST(ArmKinematics, AcceleratesNoJointByMoreThanTheLimit)
 {
   constexpr double DT = 0.002;          // [s]
   constexpr double ACCELERATION = 2.0;  // [rad/s²]
-  const ArmKinematics arm(urdf(), {});
+  const ArmKinematics arm(pumaUrdf(), {});
   Rng rng(5);
   for (int i = 0; i < 100; ++i)
   {
@@ -239,10 +229,10 @@ TEST(ArmKinematics, NamesFaultsOfItsParameters)
   params.damping = -1.0;
   params.min_manipulability = std::numeric_limits<double>::quiet_NaN();
   EXPECT_EQ(params.validate().size(), 4U);
-  EXPECT_THROW(ArmKinematics(urdf(), params), std::invalid_argument);
+  EXPECT_THROW(ArmKinematics(pumaUrdf(), params), std::invalid_argument);
   params = {};
   params.camera_frame = "nowhere";
-  EXPECT_THROW(ArmKinematics(urdf(), params), std::invalid_argument);
+  EXPECT_THROW(ArmKinematics(pumaUrdf(), params), std::invalid_argument);
 }
 
 }  // namespace view_servo::sim

@@ -3,6 +3,7 @@
 #include "sim/renderer.h"
 
 #include "sim/textures.h"
+#include "support/cameras.h"
 #include "support/synthetic_scene.h"
 
 #include <gtest/gtest.h>
@@ -23,10 +24,7 @@ constexpr double SIDE = 0.8;  // of the checker [m]
 
 Camera pinhole()
 {
-  Camera camera;
-  camera.width = 640;
-  camera.height = 480;
-  camera.k << 610.0, 0.0, 322.5, 0.0, 605.0, 236.0, 0.0, 0.0, 1.0;
+  Camera camera = test::pinholeCamera({ 640, 480 }, 610.0, 605.0, 322.5, 236.0);
   camera.distortion_model = "plumb_bob";
   camera.distortion.assign(5, 0.0);
   return camera;
@@ -162,7 +160,7 @@ TEST(SimulatedCamera, DistortsAsItsCalibrationSays)
   EXPECT_GT(largest, 2.0);  // it does distort
 }
 
-TEST(SimulatedCamera, SameSeedSameBytes)
+TEST(SimulatedCamera, SameSeedGivesTheSameBytes)
 {
   World world = checkerWorld();
   world.quality.noise = 3.0;

@@ -4,7 +4,8 @@
 #include "sim/world_reader.h"
 
 #include "sim/nomad.h"
-#include "test_paths.h"
+#include "support/cameras.h"
+#include "support/shipped_files.h"
 
 #include <gtest/gtest.h>
 
@@ -36,9 +37,7 @@ Surface plate(double distance, double y, double z, double width, double height)
 World wallWorld()
 {
   World world;
-  world.camera.width = 640;
-  world.camera.height = 480;
-  world.camera.k << 500.0, 0.0, 319.5, 0.0, 500.0, 239.5, 0.0, 0.0, 1.0;
+  world.camera = test::pinholeCamera({ 640, 480 }, 500.0, 500.0, 319.5, 239.5);
   world.surfaces = { plate(4.0, 0.0, 0.0, 40.0, 40.0) };
   return world;
 }
@@ -116,7 +115,7 @@ TEST(FirstHit, GroupsAreNotShown)
 
 TEST(FirstHit, MeetsTheDesksBackWall)
 {
-  const World world = readWorld(PACKAGE_DIR "/config/worlds/desk.yaml");
+  const World world = readWorld(test::worldFile("desk"));
   // Above all that stands there; the wall is at x = 3.2, the floor 1 m below.
   EXPECT_NEAR(distanceAlong(world, { 0.0, 0.0, 2.2 }, { 1.0, 0.0, 0.0 }), 3.2, 1e-9);
   EXPECT_NEAR(distanceAlong(world, { -1.0, 0.0, 1.0 }, { 0.0, 0.0, -1.0 }), 1.0, 1e-9);
@@ -127,7 +126,7 @@ TEST(ShareInSight, IsOneFromTheSamePose)
   EXPECT_EQ(shareInSight(wallWorld(), cameraAt(0.0, 0.0), cameraAt(0.0, 0.0)), 1.0);
   for (const char* name : { "desk", "cabinet", "corridor" })
   {
-    const World world = readWorld(std::string(PACKAGE_DIR "/config/worlds/") + name + ".yaml");
+    const World world = readWorld(test::worldFile(name));
     const Eigen::Isometry3d pose = Nomad(world, {}).cameraPose();
     EXPECT_EQ(shareInSight(world, pose, pose), 1.0) << name;
   }

@@ -4,15 +4,16 @@
 
 #include "sim/nomad.h"
 #include "sim/renderer.h"
+#include "support/shipped_files.h"
 #include "support/temporary_directory.h"
-#include "test_paths.h"
+#include "support/text_file.h"
+#include "support/thrown_message.h"
 
 #include <gtest/gtest.h>
 #include <opencv2/core.hpp>
 #include <opencv2/imgproc.hpp>
 
 #include <filesystem>
-#include <fstream>
 #include <stdexcept>
 #include <string>
 #include <vector>
@@ -26,7 +27,7 @@ namespace fs = std::filesystem;
 std::vector<std::string> worldFiles()
 {
   std::vector<std::string> files;
-  for (const auto& entry : fs::directory_iterator(PACKAGE_DIR "/config/worlds"))
+  for (const auto& entry : fs::directory_iterator(test::WORLDS_DIRECTORY))
   {
     if (entry.path().extension() == ".yaml")
     {
@@ -57,30 +58,17 @@ const char* const SMALL_WORLD =
 std::string faultOf(const std::string& from, const std::string& to)
 {
   const test::TemporaryDirectory directory;
-  std::string text = SMALL_WORLD;
-  const std::size_t at = text.find(from);
-  EXPECT_NE(at, std::string::npos) << from;
-  text.replace(at, from.size(), to);
-  const std::string file = (directory.path() / "world.yaml").string();
-  std::ofstream(file) << text;
-  try
-  {
-    readWorld(file);
-  }
-  catch (const std::invalid_argument& error)
-  {
-    return error.what();
-  }
-  return "";
+  const std::string file = test::writeText(directory.path() / "world.yaml", test::edited(SMALL_WORLD, from, to));
+  return test::thrownMessage<std::invalid_argument>([&] { readWorld(file); });
 }
 
 }  // namespace
 
-class ShippedWorld : public testing::TestWithParam<std::string>
+class ShippedWorldTest : public testing::TestWithParam<std::string>
 {
 };
 
-TEST_P(ShippedWorld, CanBeSeenFromItsGoalAndStarts)
+TEST_P(ShippedWorldTest, CanBeSeenFromItsGoalAndStarts)
 {
   const World world = readWorld(GetParam());
   EXPECT_EQ(world.name, fs::path(GetParam()).stem().string());
@@ -106,7 +94,7 @@ TEST_P(ShippedWorld, CanBeSeenFromItsGoalAndStarts)
   }
 }
 
-INSTANTIATE_TEST_SUITE_P(Config, ShippedWorld, testing::ValuesIn(worldFiles()),
+INSTANTIATE_TEST_SUITE_P(Config, ShippedWorldTest, testing::ValuesIn(worldFiles()),
                          [](const testing::TestParamInfo<std::string>& file) {
                            return fs::path(file.param).stem().string();
                          });

@@ -4,7 +4,7 @@
 
 #include "sim/textures.h"
 #include "sim/world_reader.h"
-#include "test_paths.h"
+#include "support/shipped_files.h"
 
 #include <gtest/gtest.h>
 #include <opencv2/core.hpp>
@@ -18,7 +18,7 @@ namespace view_servo::sim
 {
 TEST(World, NamesTheStartsThereAre)
 {
-  const World world = readWorld(PACKAGE_DIR "/config/worlds/desk.yaml");
+  const World world = readWorld(test::worldFile("desk"));
   EXPECT_NO_THROW(world.start("thesis"));
   try
   {
@@ -70,7 +70,7 @@ TEST(World, TrajectoriesAreInterpolated)
 
 TEST(World, NoiseAndFocalLengthsCanBeOthers)
 {
-  const World world = readWorld(PACKAGE_DIR "/config/worlds/desk.yaml");
+  const World world = readWorld(test::worldFile("desk"));
   EXPECT_EQ(withImageNoise(world, 7.0).quality.noise, 7.0);
   EXPECT_EQ(withImageNoise(world, 0.0).quality.noise, 0.0);
   EXPECT_EQ(withImageNoise(world, -1.0).quality.noise, world.quality.noise);

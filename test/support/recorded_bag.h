@@ -3,6 +3,9 @@
 #pragma once
 
 #include "sim_ros/robot_messages.h"
+#include "support/cameras.h"
+#include "support/program_run.h"
+#include "test_paths.h"
 #include "view_servo/geometry/camera.h"
 #include "view_servo/geometry/fundamental.h"
 #include "view_servo/geometry/homography.h"
@@ -29,6 +32,19 @@ namespace view_servo
 namespace test
 {
 /** @file What bags of simulated robots hold, and what their ground truth says of pairs of images. */
+
+/**
+ * Has the program record_bag write a run of a simulated robot; a failure fails the test, with what it says.
+ * @param world file of the world. @param options more of the program's.
+ */
+inline void recordBag(const std::string& world, const std::string& trajectory, const std::string& bag,
+                      const std::vector<std::string>& options = {})
+{
+  std::vector<std::string> arguments{ world, trajectory, bag };
+  arguments.insert(arguments.end(), options.begin(), options.end());
+  const ProgramRun run = runProgram(RECORD_BAG_PATH, arguments);
+  ASSERT_EQ(run.status, 0) << run.err;
+}
 
 /** What a bag says of one image. */
 struct Frame
@@ -81,11 +97,8 @@ public:
   {
     const Eigen::Isometry3d motion = current.pose.inverse() * reference.pose;
     const Eigen::Vector3d& t = motion.translation();
-    const Eigen::Matrix3d k_inverse = reference.camera.k.inverse();
-    Eigen::Matrix3d t_cross;
-    t_cross << 0.0, -t.z(), t.y(), t.z(), 0.0, -t.x(), -t.y(), t.x(), 0.0;
-    fundamental_ = current.camera.k.inverse().transpose() * t_cross * motion.linear() * k_inverse;
-    far_away_ = current.camera.k * motion.linear() * k_inverse;
+    fundamental_ = fundamentalOf(reference.camera.k, current.camera.k, motion.linear(), t);
+    far_away_ = current.camera.k * motion.linear() * reference.camera.k.inverse();
     constexpr double NO_MOTION = 1e-3;  // [m]; then all points move as those far away
     moved_ = t.norm() > NO_MOTION;
   }

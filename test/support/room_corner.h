@@ -2,6 +2,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include "support/cameras.h"
 #include "support/textured_plane.h"
 
 #include <Eigen/Core>
@@ -17,18 +18,16 @@ namespace view_servo
 {
 namespace test
 {
-/** What another camera sees of a plane; grey beside it. @param h image -> result [px]. */
-inline cv::Mat viewThrough(const cv::Mat& image, const Eigen::Matrix3d& h)
-{
-  cv::Mat matrix;
-  cv::eigen2cv(h, matrix);
-  cv::Mat result;
-  cv::warpPerspective(image, result, matrix, image.size(), cv::INTER_CUBIC, cv::BORDER_CONSTANT, cv::Scalar(110));
-  return result;
-}
-
 /** Of RoomCorner's pictures [px]. */
 inline const cv::Size PICTURE_SIZE(640, 480);
+
+/** The camera that took them. */
+inline Camera roomCamera()
+{
+  Camera camera = pinholeCamera(PICTURE_SIZE, 500.0, 500.0, 319.5, 239.5);
+  camera.distortion_model = "plumb_bob";
+  return camera;
+}
 
 /** Two walls that meet in the upright line u = 320 of the reference, each with its texture: a corner of a room. */
 struct RoomCorner
@@ -41,8 +40,7 @@ struct RoomCorner
 
   RoomCorner()
   {
-    Eigen::Matrix3d k;
-    k << 500.0, 0.0, 319.5, 0.0, 500.0, 239.5, 0.0, 0.0, 1.0;
+    const Eigen::Matrix3d k = roomCamera().k;
     // Walls at 45 degrees to the optical axis that meet 4 m ahead.
     const Eigen::Vector3d n_left(-std::sqrt(0.5), 0.0, std::sqrt(0.5));
     const Eigen::Vector3d n_right(std::sqrt(0.5), 0.0, std::sqrt(0.5));
@@ -51,9 +49,7 @@ struct RoomCorner
     const Eigen::Vector3d t(-0.6, 0.1, 0.2);
     left = k * (r + t * n_left.transpose() / d) * k.inverse();
     right = k * (r + t * n_right.transpose() / d) * k.inverse();
-    Eigen::Matrix3d cross;
-    cross << 0.0, -t.z(), t.y(), t.z(), 0.0, -t.x(), -t.y(), t.x(), 0.0;
-    f = k.inverse().transpose() * cross * r * k.inverse();
+    f = fundamentalOf(k, k, r, t);
 
     const cv::Mat texture_left = texturedPicture(21, PICTURE_SIZE);
     const cv::Mat texture_right = texturedPicture(22, PICTURE_SIZE);
@@ -66,8 +62,8 @@ struct RoomCorner
     cv::Mat matrix;
     cv::eigen2cv(right, matrix);
     cv::warpPerspective(mask, seen_mask, matrix, PICTURE_SIZE, cv::INTER_NEAREST);
-    current = viewThrough(texture_left, left);
-    viewThrough(texture_right, right).copyTo(current, seen_mask);
+    current = warpedPicture(texture_left, left);
+    warpedPicture(texture_right, right).copyTo(current, seen_mask);
   }
 };
 

@@ -2,6 +2,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include "support/cameras.h"
+
 #include "view_servo/geometry/correspondence.h"
 #include "view_servo/geometry/rotation_vector.h"
 #include "view_servo/robust/ransac.h"
@@ -44,13 +46,6 @@ inline Eigen::Matrix3d randomRotation(Rng& rng, double deviation)
                         : Eigen::Matrix3d(Eigen::Matrix3d::Identity());
 }
 
-inline Eigen::Matrix3d crossMatrix(const Eigen::Vector3d& v)
-{
-  Eigen::Matrix3d m;
-  m << 0.0, -v.z(), v.y(), v.z(), 0.0, -v.x(), -v.y(), v.x(), 0.0;
-  return m;
-}
-
 struct SceneOptions
 {
   int inliers = 100;
@@ -77,7 +72,7 @@ struct Scene
 inline Scene makeScene(const SceneOptions& options, Rng& rng)
 {
   Scene scene;
-  scene.k << 600.0, 0.0, 0.5 * IMAGE_WIDTH, 0.0, 600.0, 0.5 * IMAGE_HEIGHT, 0.0, 0.0, 1.0;
+  scene.k = cameraMatrix(600.0, 600.0, 0.5 * IMAGE_WIDTH, 0.5 * IMAGE_HEIGHT);
   // The current camera stands 0.7 to 1.5 to the side and turns to the point 4.5 units before the reference camera.
   const double bearing = uniform(rng, 0.0, 2.0 * M_PI);
   const double baseline = uniform(rng, 0.7, 1.5);
@@ -91,7 +86,7 @@ inline Scene makeScene(const SceneOptions& options, Rng& rng)
   scene.d = scene.n.dot(target);
   const Eigen::Matrix3d k_inverse = scene.k.inverse();
   scene.homography = (scene.k * (scene.r + scene.t * scene.n.transpose() / scene.d) * k_inverse).normalized();
-  scene.fundamental = (k_inverse.transpose() * crossMatrix(scene.t) * scene.r * k_inverse).normalized();
+  scene.fundamental = fundamentalOf(scene.k, scene.k, scene.r, scene.t).normalized();
 
   const auto noise = [&] {
     const double u = options.noise * gaussian(rng);
@@ -131,6 +126,17 @@ inline Scene makeScene(const SceneOptions& options, Rng& rng)
     scene.is_inlier[j] = inlier;
   }
   return scene;
+}
+
+/** A scene without outliers. @param noise as in SceneOptions. */
+inline Scene makeScene(int points, double noise, std::uint64_t seed, bool planar = false)
+{
+  Rng rng(seed);
+  SceneOptions options;
+  options.inliers = points;
+  options.noise = noise;
+  options.planar = planar;
+  return makeScene(options, rng);
 }
 
 /** Exact pairs of `count` points in a cube seen in two scaled-orthographic views of different scale and direction. */

@@ -60,7 +60,7 @@ inline Eigen::Matrix3d exampleHomography()
   return h;
 }
 
-/** The picture seen through `h` (picture -> result), on grey ground. */
+/** The picture seen through `h` (picture -> result), on grey ground. @param size of the result; without: the picture's. */
 inline cv::Mat warpedPicture(const cv::Mat& picture, const Eigen::Matrix3d& h, const cv::Size& size)
 {
   cv::Mat matrix;
@@ -68,6 +68,11 @@ inline cv::Mat warpedPicture(const cv::Mat& picture, const Eigen::Matrix3d& h, c
   cv::Mat result;
   cv::warpPerspective(picture, result, matrix, size, cv::INTER_LINEAR, cv::BORDER_CONSTANT, cv::Scalar(128));
   return result;
+}
+
+inline cv::Mat warpedPicture(const cv::Mat& picture, const Eigen::Matrix3d& h)
+{
+  return warpedPicture(picture, h, picture.size());
 }
 
 /** The picture under another light, with noise. */

@@ -18,7 +18,7 @@ RegionPicker drag(const cv::Size& image, const cv::Point& from, const cv::Point&
   return picker;
 }
 
-TEST(RegionPicker, takesCornersInAnyOrder)
+TEST(RegionPicker, TakesCornersInAnyOrder)
 {
   const cv::Rect expected(100, 50, 200, 150);
   EXPECT_EQ(drag({ 640, 480 }, { 100, 50 }, { 300, 200 }).region(), expected);
@@ -26,20 +26,20 @@ TEST(RegionPicker, takesCornersInAnyOrder)
   EXPECT_EQ(drag({ 640, 480 }, { 100, 200 }, { 300, 50 }).region(), expected);
 }
 
-TEST(RegionPicker, staysWithinTheImage)
+TEST(RegionPicker, StaysWithinTheImage)
 {
   EXPECT_EQ(drag({ 640, 480 }, { 600, 400 }, { 900, 700 }).region(), cv::Rect(600, 400, 40, 80));
   EXPECT_EQ(drag({ 640, 480 }, { 100, 100 }, { -20, -30 }).region(), cv::Rect(0, 0, 100, 100));
 }
 
-TEST(RegionPicker, countsInPixelsOfALargeImage)
+TEST(RegionPicker, CountsInPixelsOfALargeImage)
 {
   const RegionPicker picker = drag({ 2560, 1600 }, { 100, 50 }, { 300, 200 });
   EXPECT_DOUBLE_EQ(picker.scale(), 0.5);
   EXPECT_EQ(picker.region(), cv::Rect(200, 100, 400, 300));
 }
 
-TEST(RegionPicker, clickTakesRegionBack)
+TEST(RegionPicker, ClickTakesTheRegionBack)
 {
   RegionPicker picker = drag({ 640, 480 }, { 100, 50 }, { 300, 200 });
   picker.press({ 10, 10 });
@@ -49,14 +49,14 @@ TEST(RegionPicker, clickTakesRegionBack)
   EXPECT_TRUE(picker.region().empty());
 }
 
-TEST(RegionPicker, movesCountOnlyWhileTheButtonIsDown)
+TEST(RegionPicker, MovesCountOnlyWhileTheButtonIsDown)
 {
   RegionPicker picker = drag({ 640, 480 }, { 100, 50 }, { 300, 200 });
   picker.move({ 500, 400 });
   EXPECT_EQ(picker.region(), cv::Rect(100, 50, 200, 150));
 }
 
-TEST(RegionPicker, anotherImageSizeTakesRegionBack)
+TEST(RegionPicker, AnotherImageSizeTakesTheRegionBack)
 {
   RegionPicker picker = drag({ 640, 480 }, { 100, 50 }, { 300, 200 });
   picker.setImageSize({ 640, 480 });

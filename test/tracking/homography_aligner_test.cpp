@@ -5,8 +5,9 @@
 #include "sim/renderer.h"
 #include "sim/world_reader.h"
 #include "support/corner_error.h"
+#include "support/shipped_files.h"
 #include "support/textured_plane.h"
-#include "test_paths.h"
+#include "support/thrown_message.h"
 #include "view_servo/geometry/homography.h"
 
 #include <gtest/gtest.h>
@@ -76,15 +77,7 @@ Eigen::Matrix3d rolled(double angle, double scale)
 
 std::string messageOf(const cv::Mat& reference, const cv::Rect& region, const HomographyAlignerParams& params)
 {
-  try
-  {
-    const HomographyAligner tracker(reference, region, params);
-  }
-  catch (const std::invalid_argument& error)
-  {
-    return error.what();
-  }
-  return "";
+  return test::thrownMessage<std::invalid_argument>([&] { HomographyAligner(reference, region, params); });
 }
 
 }  // namespace
@@ -201,7 +194,7 @@ TEST(HomographyAligner, AllPixelsHaveTheLastWord)
 {
   constexpr int PLACES = 8;
   constexpr double DISTANCE = 0.46;  // of the printed face from the world's goal [m]
-  sim::World world = sim::readWorld(PACKAGE_DIR "/config/worlds/rice.yaml");
+  sim::World world = sim::readWorld(test::worldFile("rice"));
   world.quality.noise = 2.0;
   sim::SimulatedCamera camera(world, {}, 1);
   const cv::Mat reference = camera.capture(world.goal);

@@ -2,6 +2,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "view_servo/tracking/plane_filter.h"
 
+#include "support/cameras.h"
 #include "support/synthetic_scene.h"
 #include "view_servo/geometry/homography.h"
 
@@ -21,12 +22,7 @@ namespace
 {
 constexpr double DEGREE = M_PI / 180.0;
 
-Eigen::Matrix3d cameraMatrix()
-{
-  Eigen::Matrix3d k;
-  k << 600.0, 0.0, 320.0, 0.0, 600.0, 240.0, 0.0, 0.0, 1.0;
-  return k;
-}
+const Eigen::Matrix3d K = test::cameraMatrix(600.0, 600.0, 320.0, 240.0);
 
 /** A camera that moves before a plane, with the homographies that noisy points give. */
 class Approach
@@ -72,8 +68,7 @@ public:
 
   Eigen::Matrix3d measure(double part, double noise)
   {
-    const Eigen::Matrix3d k = cameraMatrix();
-    const Eigen::Matrix3d h = k * truth(part).matrix() * k.inverse();
+    const Eigen::Matrix3d h = K * truth(part).matrix() * K.inverse();
     Correspondences pairs;
     for (const Eigen::Vector2d& point : points_)
     {
@@ -88,7 +83,7 @@ public:
 
   void addTo(PlaneFilter& filter, double part, double noise)
   {
-    filter.add(cameraInOdom(part), measure(part, noise), cameraMatrix(), points_);
+    filter.add(cameraInOdom(part), measure(part, noise), K, points_);
   }
   const Points& points() const
   {
@@ -130,11 +125,11 @@ TEST(PlaneFilter, KnowsNothingAtFirst)
   EXPECT_FALSE(filter.estimate());
   const Points seen{ { 200.0, 200.0 }, { 400.0, 300.0 } };
   const Eigen::Matrix3d mirror = Eigen::Vector3d(-1.0, 1.0, 1.0).asDiagonal();
-  filter.add(Eigen::Isometry3d::Identity(), mirror, cameraMatrix(), seen);
+  filter.add(Eigen::Isometry3d::Identity(), mirror, K, seen);
   EXPECT_FALSE(filter.estimate());
   // A camera that has only turned tells its rotation, but no plane.
   const Eigen::Matrix3d turn = Eigen::AngleAxisd(0.2, Eigen::Vector3d(0.6, 0.0, 0.8)).toRotationMatrix();
-  filter.add(Eigen::Isometry3d::Identity(), cameraMatrix() * turn * cameraMatrix().inverse(), cameraMatrix(), seen);
+  filter.add(Eigen::Isometry3d::Identity(), K * turn * K.inverse(), K, seen);
   ASSERT_TRUE(filter.estimate());
   EXPECT_FALSE(filter.estimate()->normal_known);
   EXPECT_FALSE(filter.estimate()->distance);
@@ -155,7 +150,7 @@ TEST(PlaneFilter, FindsPlaneDistanceAndMotionOnTheWay)
     {
       const double part = 0.9 * i / STEPS;
       const Eigen::Matrix3d h = approach.measure(part, 0.3);
-      filter.add(approach.cameraInOdom(part), h, cameraMatrix(), approach.points());
+      filter.add(approach.cameraInOdom(part), h, K, approach.points());
       const auto estimate = filter.estimate();
       ASSERT_TRUE(estimate) << seed;
       if (!estimate->ambiguous)
@@ -170,7 +165,7 @@ TEST(PlaneFilter, FindsPlaneDistanceAndMotionOnTheWay)
         EXPECT_GT(estimate->motion.normal.dot(approach.normal()), std::cos(3.0 * DEGREE)) << seed << ", " << i;
         const EuclideanHomography truth = approach.truth(part);
         double best = 1e9;
-        for (const EuclideanHomography& solution : decomposeHomography(h, cameraMatrix(), approach.points()))
+        for (const EuclideanHomography& solution : decomposeHomography(h, K, approach.points()))
         {
           best = std::min(best, rotationError(solution.rotation, truth.rotation));
         }
@@ -225,7 +220,7 @@ TEST(PlaneFilter, DoesWithoutOdometry)
   for (int i = 0; i <= 60; ++i)
   {
     const double part = i / 80.0;
-    filter.add(std::nullopt, approach.measure(part, 0.2), cameraMatrix(), approach.points());
+    filter.add(std::nullopt, approach.measure(part, 0.2), K, approach.points());
   }
   const auto estimate = filter.estimate();
   ASSERT_TRUE(estimate);
@@ -241,7 +236,7 @@ TEST(PlaneFilter, StaysAmbiguousWhereNothingTells)
   for (std::uint64_t seed = 1; seed <= 20; ++seed)
   {
     Approach approach(seed);
-    if (decomposeHomography(approach.measure(0.1, 0.0), cameraMatrix(), approach.points()).size() != 2U)
+    if (decomposeHomography(approach.measure(0.1, 0.0), K, approach.points()).size() != 2U)
     {
       continue;
     }

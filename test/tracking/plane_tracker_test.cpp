@@ -2,6 +2,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "view_servo/tracking/plane_tracker.h"
 
+#include "support/cameras.h"
 #include "support/corner_error.h"
 
 #include "sim/textures.h"
@@ -33,12 +34,7 @@ constexpr int HEIGHT = 480;
 constexpr double DISTANCE = 0.6;  // [m]
 constexpr double RATE = 30.0;     // [Hz]
 
-Eigen::Matrix3d cameraMatrix()
-{
-  Eigen::Matrix3d k;
-  k << 600.0, 0.0, 319.5, 0.0, 600.0, 239.5, 0.0, 0.0, 1.0;
-  return k;
-}
+const Eigen::Matrix3d K = test::cameraMatrix(600.0, 600.0, 319.5, 239.5);
 
 /** A picture on a wall, seen by a camera that moves, with the odometry of an arm. */
 class Scene
@@ -63,8 +59,7 @@ public:
   Eigen::Matrix3d truth(double time) const
   {
     const Eigen::Isometry3d motion = camera(time).inverse();
-    return cameraMatrix() * EuclideanHomography{ motion.linear(), motion.translation() / DISTANCE, normal_ }.matrix() *
-           cameraMatrix().inverse();
+    return K * EuclideanHomography{ motion.linear(), motion.translation() / DISTANCE, normal_ }.matrix() * K.inverse();
   }
 
   /** With noise of 0.2 mm and 0.02 degrees, in a frame of its own. */
@@ -110,7 +105,7 @@ class PlaneTrackerTest : public testing::Test
 {
 protected:
   Scene scene;
-  PlaneTracker tracker{ scene.image(Eigen::Matrix3d::Identity()), cv::Rect(), cameraMatrix(), PlaneTrackerParams() };
+  PlaneTracker tracker{ scene.image(Eigen::Matrix3d::Identity()), cv::Rect(), K, PlaneTrackerParams() };
 };
 
 }  // namespace
@@ -124,7 +119,7 @@ TEST(PlaneTrackerParams, NameAllFaultsAtOnce)
   params.lost_after = 0;
   EXPECT_EQ(params.validate().size(), 3U);
   const Scene scene;
-  EXPECT_THROW(PlaneTracker(scene.image(0.0), cv::Rect(), cameraMatrix(), params), std::invalid_argument);
+  EXPECT_THROW(PlaneTracker(scene.image(0.0), cv::Rect(), K, params), std::invalid_argument);
 }
 
 TEST_F(PlaneTrackerTest, SearchesUntilItIsStarted)
@@ -181,7 +176,7 @@ TEST_F(PlaneTrackerTest, DoesWithoutOdometry)
 /** Odometry tells of jumps that the images alone could not follow. */
 TEST_F(PlaneTrackerTest, JumpsWithOdometry)
 {
-  PlaneTracker alone(scene.image(Eigen::Matrix3d::Identity()), cv::Rect(), cameraMatrix(), PlaneTrackerParams());
+  PlaneTracker alone(scene.image(Eigen::Matrix3d::Identity()), cv::Rect(), K, PlaneTrackerParams());
   int followed_alone = 0;
   tracker.start(scene.truth(0.0), scene.odometry(0.0));
   alone.start(scene.truth(0.0), std::nullopt);

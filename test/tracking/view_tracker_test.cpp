@@ -5,8 +5,8 @@
 #include "sim/renderer.h"
 #include "sim/visibility.h"
 #include "sim/world_reader.h"
+#include "support/shipped_files.h"
 #include "support/textured_plane.h"
-#include "test_paths.h"
 #include "view_servo/robust/random.h"
 
 #include <gtest/gtest.h>
@@ -41,7 +41,7 @@ class Desk
 {
 public:
   Desk()
-    : world_(sim::readWorld(PACKAGE_DIR "/config/worlds/desk.yaml")),
+    : world_(sim::readWorld(test::worldFile("desk"))),
       mount_(world_.camera_on_base),
       camera_(world_, {}, 1),
       reference_(camera_.capture(cameraAt(base())))
@@ -474,7 +474,7 @@ TEST_F(ViewTrackerTest, RefusesImagesOfAnotherSize)
   EXPECT_THROW(tracker.track(cv::Mat(), {}), std::invalid_argument);
 }
 
-TEST_F(ViewTrackerTest, SameImageSamePose)
+TEST_F(ViewTrackerTest, SameImageGivesTheSamePose)
 {
   const ViewTracker tracker = desk().tracker();
   const PlanarPose here = desk().nearIt();

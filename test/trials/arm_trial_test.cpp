@@ -3,7 +3,7 @@
 #include "trials/arm_trial.h"
 #include "sim/world_reader.h"
 
-#include "test_paths.h"
+#include "support/shipped_files.h"
 #include "view_servo/geometry/homography.h"
 
 #include <gtest/gtest.h>
@@ -12,8 +12,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <fstream>
-#include <iterator>
 #include <stdexcept>
 #include <string>
 
@@ -21,18 +19,9 @@ namespace view_servo::sim
 {
 namespace
 {
+using test::pumaUrdf;
+
 constexpr double DEGREE = M_PI / 180.0;
-
-World worldOf(const std::string& name)
-{
-  return readWorld(std::string(PACKAGE_DIR "/config/worlds/") + name + ".yaml");
-}
-
-std::string pumaUrdf()
-{
-  std::ifstream stream(PACKAGE_DIR "/urdf/puma560.urdf");
-  return { std::istreambuf_iterator<char>(stream), std::istreambuf_iterator<char>() };
-}
 
 /** What table 8.1 is run with. */
 ArmConditions hardConditions()
@@ -58,7 +47,7 @@ void expectAtView(const ArmOutcome& outcome)
 
 TEST(ArmTrial, ConvergesOnTheRice)
 {
-  const World world = worldOf("rice");
+  const World world = readWorld(test::worldFile("rice"));
   ArmTrialParams params;
   ArmTrials trials(world, pumaUrdf(), params);
   const Eigen::Matrix3d k = world.camera.k;
@@ -95,7 +84,7 @@ TEST(ArmTrial, ConvergesOnTheRice)
 
 TEST(ArmTrial, ConvergesOnTheMouseUnderHardConditionsAmongDistractors)
 {
-  const World world = worldOf("mouse");
+  const World world = readWorld(test::worldFile("mouse"));
   ArmTrialParams params;
   params.conditions = hardConditions();
   params.conditions.groups = { "distractors" };
@@ -105,7 +94,7 @@ TEST(ArmTrial, ConvergesOnTheMouseUnderHardConditionsAmongDistractors)
 /** It stands while nothing is seen, and goes on. */
 TEST(ArmTrial, OutlivesACover)
 {
-  const World world = worldOf("mouse");
+  const World world = readWorld(test::worldFile("mouse"));
   ArmTrialParams params;
   params.conditions.covered_from = 1.5;
   double standing_from = 0.0;
@@ -127,7 +116,7 @@ TEST(ArmTrial, OutlivesACover)
 
 TEST(ArmTrial, GivesUpWhereTheViewIsNotInSight)
 {
-  const World world = worldOf("rice");
+  const World world = readWorld(test::worldFile("rice"));
   ArmTrialParams params;
   params.servo.lost_timeout = 1.0;
   Eigen::Isometry3d away = world.goal;
@@ -141,7 +130,7 @@ TEST(ArmTrial, GivesUpWhereTheViewIsNotInSight)
 
 TEST(ArmTrial, RefusesStartsOutOfReach)
 {
-  const World world = worldOf("rice");
+  const World world = readWorld(test::worldFile("rice"));
   Eigen::Isometry3d far = world.goal;
   far.translation().x() -= 3.0;
   EXPECT_THROW(ArmTrials(world, pumaUrdf(), ArmTrialParams()).run(far), std::invalid_argument);

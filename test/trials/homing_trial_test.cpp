@@ -4,7 +4,7 @@
 #include "sim/world_reader.h"
 
 #include "sim/visibility.h"
-#include "test_paths.h"
+#include "support/shipped_files.h"
 #include "view_servo/robust/random.h"
 
 #include <gtest/gtest.h>
@@ -24,7 +24,7 @@ constexpr double DEGREE = M_PI / 180.0;
 
 World worldOf(const std::string& name)
 {
-  return readWorld(std::string(PACKAGE_DIR "/config/worlds/") + name + ".yaml");
+  return readWorld(test::worldFile(name));
 }
 
 /** The same with one ray for each pixel, which halves a trial's time: for what does not hang on the last millimetre. */
@@ -201,7 +201,7 @@ TEST(HomingTrial, ThesisStopsNearTheView)
 
 // ---- the rest
 
-TEST(HomingTrial, SameSeedSameWay)
+TEST(HomingTrial, SameSeedGivesTheSameWay)
 {
   const World world = worldOf("cabinet");
   HomingTrialParams params;

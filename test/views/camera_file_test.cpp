@@ -2,13 +2,15 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "view_servo/views/camera_file.h"
 
+#include "support/cameras.h"
 #include "support/temporary_directory.h"
+#include "support/text_file.h"
+#include "support/thrown_message.h"
 #include "view_servo/views/view_store.h"
 
 #include <gtest/gtest.h>
 #include <opencv2/core.hpp>
 
-#include <fstream>
 #include <stdexcept>
 #include <string>
 
@@ -38,27 +40,17 @@ projection_matrix:
   data: [490, 0, 321, 0, 0, 491, 241, 0, 0, 0, 1, 0]
 )";
 
-class CameraFile : public testing::Test
+class CameraFileTest : public testing::Test
 {
 protected:
   std::string write(const std::string& text) const
   {
-    const std::string path = (directory_.path() / "camera.yaml").string();
-    std::ofstream(path) << text;
-    return path;
+    return test::writeText(directory_.path() / "camera.yaml", text);
   }
 
-  std::string complaintAbout(const std::string& path) const
+  static std::string complaintAbout(const std::string& path)
   {
-    try
-    {
-      readCameraFile(path);
-    }
-    catch (const std::runtime_error& error)
-    {
-      return error.what();
-    }
-    return "none";
+    return test::thrownMessage<std::runtime_error>([&] { readCameraFile(path); });
   }
 
   test::TemporaryDirectory directory_;
@@ -66,7 +58,7 @@ protected:
 
 }  // namespace
 
-TEST_F(CameraFile, OfCameraCalibrationIsRead)
+TEST_F(CameraFileTest, OfCameraCalibrationIsRead)
 {
   const Camera camera = readCameraFile(write(CALIBRATION));
   EXPECT_EQ(camera.width, 640);
@@ -77,7 +69,7 @@ TEST_F(CameraFile, OfCameraCalibrationIsRead)
   EXPECT_EQ(camera.projection(1, 2), 241.0);
 }
 
-TEST_F(CameraFile, OfAPrintedMessageIsRead)
+TEST_F(CameraFileTest, OfAPrintedMessageIsRead)
 {
   const Camera camera = readCameraFile(
       write("width: 320\nheight: 240\ndistortion_model: \"\"\nD: []\nK: [300, 0, 160, 0, 300, 120, 0, 0, 1]\n"
@@ -86,18 +78,15 @@ TEST_F(CameraFile, OfAPrintedMessageIsRead)
   EXPECT_TRUE(camera.isPinhole());
 }
 
-TEST_F(CameraFile, OfAStoredViewIsRead)
+TEST_F(CameraFileTest, OfAStoredViewIsRead)
 {
   StoredView view;
   view.name = "dock";
   view.image = cv::Mat(240, 320, CV_8UC1, cv::Scalar(90));
   view.frame_id = "camera";
-  Camera camera;
-  camera.width = 320;
-  camera.height = 240;
+  Camera camera = test::pinholeCamera({ 320, 240 }, 300.0, 300.0, 160.0, 120.0);
   camera.distortion_model = "plumb_bob";
   camera.distortion = { 0.1, 0.0, 0.0, 0.0, 0.0 };
-  camera.k << 300.0, 0.0, 160.0, 0.0, 300.0, 120.0, 0.0, 0.0, 1.0;
   view.camera = camera;
   ViewStore(directory_.path().string()).save(view, false);
   const Camera read = readCameraFile((directory_.path() / "dock.yaml").string());
@@ -105,17 +94,15 @@ TEST_F(CameraFile, OfAStoredViewIsRead)
   EXPECT_EQ(read.distortion, camera.distortion);
 }
 
-TEST_F(CameraFile, ThatCannotBeUsedIsNamedWithWhatIsWrong)
+TEST_F(CameraFileTest, ThatCannotBeUsedIsNamedWithWhatIsWrong)
 {
   const std::string missing = (directory_.path() / "missing.yaml").string();
   EXPECT_NE(complaintAbout(missing).find("missing.yaml': there is no such file"), std::string::npos)
       << complaintAbout(missing);
   EXPECT_NE(complaintAbout(write("hello")).find("none of camera_matrix"), std::string::npos);
-  std::string text = CALIBRATION;
-  text.replace(text.find("500.5"), 5, "-5.00");
+  std::string text = test::edited(CALIBRATION, "500.5", "-5.00");
   EXPECT_NE(complaintAbout(write(text)).find("K"), std::string::npos) << complaintAbout(write(text));
-  text = CALIBRATION;
-  text.replace(text.find("500.5, 0,"), 9, "500.5,");
+  text = test::edited(CALIBRATION, "500.5, 0,", "500.5,");
   EXPECT_NE(complaintAbout(write(text)).find("a list of 9 numbers has 8"), std::string::npos);
 }
 

@@ -3,11 +3,12 @@
 #include "view_servo/views/hand_eye_file.h"
 
 #include "support/temporary_directory.h"
+#include "support/text_file.h"
+#include "support/thrown_message.h"
 
 #include <gtest/gtest.h>
 
 #include <filesystem>
-#include <fstream>
 #include <stdexcept>
 #include <string>
 
@@ -21,17 +22,10 @@ protected:
   /** What is wrong with a file of this text. */
   std::string faultOf(const std::string& text) const
   {
-    std::ofstream(path_) << text;
-    try
-    {
-      readHandEyeFile(path_);
-    }
-    catch (const std::runtime_error& error)
-    {
-      EXPECT_NE(std::string(error.what()).find(path_), std::string::npos) << error.what();
-      return error.what();
-    }
-    return "";
+    test::writeText(path_, text);
+    std::string fault = test::thrownMessage<std::runtime_error>([this] { readHandEyeFile(path_); });
+    EXPECT_TRUE(fault.empty() || fault.find(path_) != std::string::npos) << fault;
+    return fault;
   }
 
   test::TemporaryDirectory directory_;
@@ -70,7 +64,7 @@ TEST_F(HandEyeFileTest, ReadsWhatItHasWritten)
 
 TEST_F(HandEyeFileTest, ReadsFilesOfEasyHandeye)
 {
-  std::ofstream(path_) << PARAMETERS << TRANSFORMATION;
+  test::writeText(path_, PARAMETERS + TRANSFORMATION);
   const HandEyeFile read = readHandEyeFile(path_);
   EXPECT_EQ(read.flange_frame, "tool0");
   EXPECT_EQ(read.camera_frame, "camera_optical_frame");
@@ -92,12 +86,8 @@ TEST_F(HandEyeFileTest, NamesWhatIsWrong)
       has(faultOf(PARAMETERS + "transformation: {x: .nan, y: 0, z: 0, qx: 0, qy: 0, qz: 0, qw: 1}"), "not finite"));
   EXPECT_TRUE(has(faultOf(PARAMETERS + "transformation: {x: 0, y: 0, z: 0, qx: 0, qy: 0, qz: 0, qw: 0}"), "norm"));
   EXPECT_TRUE(has(faultOf(PARAMETERS + TRANSFORMATION + "covariance: [1, 2]"), "36"));
-  std::string beside = PARAMETERS;
-  beside.replace(beside.find("true"), 4, "false");
-  EXPECT_TRUE(has(faultOf(beside + TRANSFORMATION), "eye_on_hand"));
-  std::string nameless = PARAMETERS;
-  nameless.replace(nameless.find("tool0"), 5, "''   ");
-  EXPECT_TRUE(has(faultOf(nameless + TRANSFORMATION), "robot_effector_frame is empty"));
+  EXPECT_TRUE(has(faultOf(test::edited(PARAMETERS, "true", "false") + TRANSFORMATION), "eye_on_hand"));
+  EXPECT_TRUE(has(faultOf(test::edited(PARAMETERS, "tool0", "''") + TRANSFORMATION), "robot_effector_frame is empty"));
   EXPECT_TRUE(has(faultOf("parameters: ["), "no hand-eye calibration"));
   // yaml-cpp puts the character that it does not know into its text, here a form feed or carriage return.
   for (const std::string character : { "\f", "\v", "\r" })

@@ -30,7 +30,7 @@ namespace
 const cv::Size SIZE(640, 480);
 
 using test::RoomCorner;
-using test::viewThrough;
+using test::warpedPicture;
 
 LineFeatures features(const cv::Mat& image, const LineMatcherParams& params)
 {
@@ -54,11 +54,11 @@ int correct(const ViewMatch& result, const Eigen::Matrix3d& h)
 
 }  // namespace
 
-class RolledPlane : public testing::TestWithParam<double>
+class LineViewMatcherRollTest : public testing::TestWithParam<double>
 {
 };
 
-TEST_P(RolledPlane, IsMatched)
+TEST_P(LineViewMatcherRollTest, MatchesATurnedPlane)
 {
   // A plane from another side, and turned about the optical axis.
   const double roll = GetParam() * M_PI / 180.0;
@@ -68,7 +68,7 @@ TEST_P(RolledPlane, IsMatched)
   about_middle.topRightCorner<2, 1>() = middle - about_middle.topLeftCorner<2, 2>() * middle;
   const Eigen::Matrix3d h = about_middle * test::exampleHomography();
   const cv::Mat reference = test::texturedPicture(5, SIZE);
-  const ViewMatch result = match(reference, viewThrough(reference, h));
+  const ViewMatch result = match(reference, warpedPicture(reference, h));
   ASSERT_EQ(result.outcome, MatchOutcome::MATCHED) << result.message;
   EXPECT_GE(result.lines.size(), 40U);
   EXPECT_GE(correct(result, h), static_cast<int>(0.9 * static_cast<double>(result.lines.size())));
@@ -77,13 +77,14 @@ TEST_P(RolledPlane, IsMatched)
   EXPECT_TRUE(result.fundamental.hasNaN()) << "one plane leaves F open";
 }
 
-INSTANTIATE_TEST_SUITE_P(Degrees, RolledPlane, testing::Values(0.0, 30.0, 90.0, 180.0));
+INSTANTIATE_TEST_SUITE_P(Degrees, LineViewMatcherRollTest, testing::Values(0.0, 30.0, 90.0, 180.0));
 
 TEST(LineViewMatcher, PairsOfSegmentsMatchToo)
 {
   const Eigen::Matrix3d h = test::exampleHomography();
   const cv::Mat reference = test::texturedPicture(6, SIZE);
-  const ViewMatch result = match(reference, viewThrough(reference, h), GeometryModel::HOMOGRAPHY, LineGrouping::PAIRS);
+  const ViewMatch result =
+      match(reference, warpedPicture(reference, h), GeometryModel::HOMOGRAPHY, LineGrouping::PAIRS);
   ASSERT_EQ(result.outcome, MatchOutcome::MATCHED) << result.message;
   EXPECT_GE(correct(result, h), 30);
 }
@@ -167,7 +168,7 @@ TEST(LineViewMatcher, IndicesAreThoseOfTheSegmentsGiven)
   const LineMatcherParams params;
   const Eigen::Matrix3d h = test::exampleHomography();
   const cv::Mat reference = test::texturedPicture(7, SIZE);
-  const cv::Mat current = viewThrough(reference, h);
+  const cv::Mat current = warpedPicture(reference, h);
   Segments from = detectLineSegments(reference, params.segments);
   Segments to = detectLineSegments(current, params.segments);
   std::mt19937_64 rng(2);
@@ -215,7 +216,7 @@ TEST(LineViewMatcher, FiveThousandSegmentsAreAnswered)
 TEST(LineViewMatcher, SameInputSameResult)
 {
   const cv::Mat reference = test::texturedPicture(8, SIZE);
-  const cv::Mat current = viewThrough(reference, test::exampleHomography());
+  const cv::Mat current = warpedPicture(reference, test::exampleHomography());
   const ViewMatch first = match(reference, current);
   const ViewMatch second = match(reference, current);
   ASSERT_EQ(first.lines.size(), second.lines.size());

@@ -24,14 +24,14 @@ using view_servo::setParameter;
 using view_servo::ViewRecognizerParams;
 
 template <typename Params>
-class MatcherParameters : public ::testing::Test
+class MatcherParametersTest : public ::testing::Test
 {
 };
 
 using Matchers = ::testing::Types<PointViewMatcherParams, LineMatcherParams, SceneMatcherParams, ViewRecognizerParams>;
-TYPED_TEST_SUITE(MatcherParameters, Matchers, );
+TYPED_TEST_SUITE(MatcherParametersTest, Matchers, );
 
-TYPED_TEST(MatcherParameters, HaveUniqueDocumentedNames)
+TYPED_TEST(MatcherParametersTest, HaveUniqueDocumentedNames)
 {
   TypeParam params;
   std::set<std::string> names;
@@ -44,7 +44,7 @@ TYPED_TEST(MatcherParameters, HaveUniqueDocumentedNames)
   EXPECT_GT(names.size(), 30U);
 }
 
-TYPED_TEST(MatcherParameters, ReadBackWhatTheyPrint)
+TYPED_TEST(MatcherParametersTest, ReadBackWhatTheyPrint)
 {
   TypeParam params;
   for (const Parameter& parameter : parameters(params))
@@ -55,7 +55,7 @@ TYPED_TEST(MatcherParameters, ReadBackWhatTheyPrint)
   }
 }
 
-TYPED_TEST(MatcherParameters, EachSetsSomethingOfItsOwn)
+TYPED_TEST(MatcherParametersTest, EachSetsSomethingOfItsOwn)
 {
   // Another value for each changes what its name reads, and nothing else.
   TypeParam params;

@@ -1,11 +1,8 @@
 // Copyright (c) 2026, the view_servo authors
 // SPDX-License-Identifier: BSD-3-Clause
+#include "support/matched_views.h"
 #include "support/room_corner.h"
 #include "support/textured_plane.h"
-#include "view_servo/views/line_view_matcher.h"
-#include "view_servo/views/point_view_matcher.h"
-#include "view_servo/views/prepared_image.h"
-#include "view_servo/views/scene_matcher.h"
 
 #include <gtest/gtest.h>
 #include <opencv2/core.hpp>
@@ -18,6 +15,8 @@ namespace view_servo
 {
 namespace
 {
+using test::MatchesOfAll;
+
 const cv::Size SIZE(640, 480);
 
 /** A front that is symmetric, with windows and a picture on each wing, among things that are not. */
@@ -42,23 +41,11 @@ cv::Mat symmetricFront()
   return picture;
 }
 
-struct Answers
-{
-  ViewMatch points;
-  ViewMatch lines;
-  ViewMatch scene;
-};
-
-Answers answers(const cv::Mat& current_image, bool refuse_mirrored = true)
+MatchesOfAll answers(const cv::Mat& current_image, bool refuse_mirrored = true)
 {
   SceneMatcherParams params;
   params.points.refuse_mirrored = params.lines.refuse_mirrored = refuse_mirrored;
-  const SceneMatcher scene(params);
-  const PreparedImage reference(symmetricFront(), cv::Rect(), scene.features());
-  const PreparedImage current(test::disturbed(current_image, 0.9, 5.0, 2.0), cv::Rect(), scene.features());
-  return { PointViewMatcher(params.points).match(reference, current, GeometryModel::HOMOGRAPHY),
-           LineViewMatcher(params.lines).match(reference, current, GeometryModel::HOMOGRAPHY),
-           scene.match(reference, current) };
+  return test::matchByAll(params, symmetricFront(), test::disturbed(current_image, 0.9, 5.0, 2.0));
 }
 
 cv::Mat mirrored(const cv::Mat& picture)
@@ -70,13 +57,13 @@ cv::Mat mirrored(const cv::Mat& picture)
 
 }  // namespace
 
-TEST(Mirror, IsRefusedWhereWhatIsSymmetricMatches)
+TEST(MirroredView, IsRefusedWhereWhatIsSymmetricMatches)
 {
-  const Answers believing = answers(mirrored(symmetricFront()), false);
+  const MatchesOfAll believing = answers(mirrored(symmetricFront()), false);
   EXPECT_TRUE(believing.points.outcome == MatchOutcome::MATCHED || believing.lines.outcome == MatchOutcome::MATCHED ||
               believing.scene.outcome == MatchOutcome::MATCHED)
       << "the picture is no test";
-  const Answers found = answers(mirrored(symmetricFront()));
+  const MatchesOfAll found = answers(mirrored(symmetricFront()));
   for (const ViewMatch& match : { found.points, found.lines, found.scene })
   {
     EXPECT_EQ(match.outcome, MatchOutcome::NO_GEOMETRY) << match.message;
@@ -91,39 +78,31 @@ TEST(Mirror, IsRefusedWhereWhatIsSymmetricMatches)
       << found.scene.message;
 }
 
-TEST(Mirror, IsRefusedByPointsWhereNothingIsSymmetric)
+TEST(MirroredView, IsRefusedByPointsWhereNothingIsSymmetric)
 {
-  const PointViewMatcher matcher{ PointViewMatcherParams() };
   for (const GeometryModel model : { GeometryModel::HOMOGRAPHY, GeometryModel::FUNDAMENTAL })
   {
     for (int seed = 0; seed < 2; ++seed)
     {
       const cv::Mat reference = test::texturedPicture(300 + seed);
-      const ViewMatch match =
-          matcher.match(PreparedImage(reference, cv::Rect(), matcher.params().points),
-                        PreparedImage(mirrored(reference), cv::Rect(), matcher.params().points), model);
+      const ViewMatch match = test::matchPoints(PointViewMatcherParams(), reference, mirrored(reference), model);
       EXPECT_EQ(match.outcome, MatchOutcome::NO_GEOMETRY) << "seed " << seed << ": " << match.message;
     }
   }
 }
 
-TEST(Mirror, IsRefusedInARoom)
+TEST(MirroredView, IsRefusedInARoom)
 {
   const test::RoomCorner room;
-  const SceneMatcher matcher{ SceneMatcherParams() };
-  const auto match = [&](const cv::Mat& reference, const cv::Mat& current) {
-    return matcher.match(PreparedImage(reference, cv::Rect(), matcher.features()),
-                         PreparedImage(current, cv::Rect(), matcher.features()));
-  };
-  const ViewMatch plane = match(room.reference, mirrored(room.reference));
+  const ViewMatch plane = test::matchScene(room.reference, mirrored(room.reference));
   EXPECT_NE(plane.outcome, MatchOutcome::MATCHED) << plane.message;
-  const ViewMatch corner = match(room.reference, mirrored(room.current));
+  const ViewMatch corner = test::matchScene(room.reference, mirrored(room.current));
   EXPECT_NE(corner.outcome, MatchOutcome::MATCHED) << corner.message;
 }
 
-TEST(Mirror, IsNoneInFrontOfSymmetricThings)
+TEST(MirroredView, IsNoneInFrontOfSymmetricThings)
 {
-  const Answers found = answers(symmetricFront());
+  const MatchesOfAll found = answers(symmetricFront());
   for (const ViewMatch& match : { found.points, found.lines, found.scene })
   {
     EXPECT_EQ(match.outcome, MatchOutcome::MATCHED) << match.message;

@@ -2,11 +2,11 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "view_servo/views/point_view_matcher.h"
 
+#include "support/cameras.h"
 #include "support/corner_error.h"
-
-#include "view_servo/geometry/fundamental.h"
-
+#include "support/matched_views.h"
 #include "support/textured_plane.h"
+#include "view_servo/geometry/fundamental.h"
 
 #include <gtest/gtest.h>
 #include <Eigen/Geometry>
@@ -36,6 +36,7 @@ using view_servo::test::blotchedPicture;
 using view_servo::test::cornerError;
 using view_servo::test::disturbed;
 using view_servo::test::exampleHomography;
+using view_servo::test::matchPoints;
 using view_servo::test::texturedPicture;
 using view_servo::test::warpedPicture;
 
@@ -47,13 +48,6 @@ Eigen::Matrix3d steepHomography()
   Eigen::Matrix3d steep;
   steep << 0.45, 0.02, 90.0, -0.1, 0.85, 40.0, -6e-4, 1e-4, 1.0;
   return steep;
-}
-
-ViewMatch matchImages(const PointViewMatcherParams& params, const cv::Mat& reference, const cv::Mat& current,
-                      GeometryModel model = GeometryModel::HOMOGRAPHY, const cv::Rect& region = cv::Rect())
-{
-  return PointViewMatcher(params).match(PreparedImage(reference, region, params.points),
-                                        PreparedImage(current, cv::Rect(), params.points), model);
 }
 
 /** The picture seen through `h`, which maps to pixels `over` times as small as those of the result. */
@@ -74,15 +68,10 @@ struct Book
 {
   Book()
   {
-    Eigen::Matrix3d k;
-    k << 420.0, 0.0, 239.5, 0.0, 420.0, 179.5, 0.0, 0.0, 1.0;
+    const Eigen::Matrix3d k = view_servo::test::cameraMatrix(420.0, 420.0, 239.5, 179.5);
     const Eigen::Matrix3d rotation = Eigen::AngleAxisd(-0.25, Eigen::Vector3d::UnitY()).toRotationMatrix();
     const Eigen::Vector3d translation(0.35, 0.05, 0.1);
-    Eigen::Matrix3d cross;
-    cross << 0.0, -translation.z(), translation.y(), translation.z(), 0.0, -translation.x(), -translation.y(),
-        translation.x(), 0.0;
-    fundamental = k.inverse().transpose() * cross * rotation * k.inverse();
-    fundamental.normalize();
+    fundamental = view_servo::test::fundamentalOf(k, k, rotation, translation).normalized();
 
     reference = texturedPicture(21, SIZE);
     current = cv::Mat(SIZE, CV_8UC1, cv::Scalar(128));
@@ -119,7 +108,7 @@ TEST(PointViewMatcher, FindsThePlaneToAFractionOfAPixel)
 {
   const cv::Mat reference = texturedPicture(1);
   const cv::Mat current = disturbed(warpedPicture(reference, exampleHomography(), SIZE), 0.8, 10.0, 2.0);
-  const ViewMatch match = matchImages(PointViewMatcherParams(), reference, current);
+  const ViewMatch match = matchPoints(PointViewMatcherParams(), reference, current);
   ASSERT_EQ(match.outcome, MatchOutcome::MATCHED) << match.message;
   EXPECT_LT(cornerError(match.matrix, exampleHomography(), SIZE), 0.3);
   EXPECT_EQ(match.matrix(2, 2), 1.0);
@@ -145,9 +134,9 @@ TEST(PointViewMatcher, GuidedMatchingFindsMore)
   const Eigen::Matrix3d steep = steepHomography();
   const cv::Mat current = disturbed(warpedPicture(reference, steep, SIZE), 0.7, 10.0, 4.0);
   PointViewMatcherParams params;
-  const ViewMatch guided = matchImages(params, reference, current);
+  const ViewMatch guided = matchPoints(params, reference, current);
   params.guided = false;
-  const ViewMatch plain = matchImages(params, reference, current);
+  const ViewMatch plain = matchPoints(params, reference, current);
   ASSERT_EQ(plain.outcome, MatchOutcome::MATCHED);
   EXPECT_GT(guided.inliers, plain.inliers * 13 / 10);
   EXPECT_LT(cornerError(guided.matrix, steep, SIZE), cornerError(plain.matrix, steep, SIZE));
@@ -160,7 +149,7 @@ TEST(PointViewMatcher, FindsEpipolarGeometryOfASceneWithDepth)
   {
     PointViewMatcherParams params;
     params.view_consistency = consistency;
-    const ViewMatch match = matchImages(params, book.reference, book.current, GeometryModel::FUNDAMENTAL);
+    const ViewMatch match = matchPoints(params, book.reference, book.current, GeometryModel::FUNDAMENTAL);
     ASSERT_EQ(match.outcome, MatchOutcome::MATCHED) << match.message;
     EXPECT_GT(match.inliers, 80);
     EXPECT_NEAR(match.matrix.norm(), 1.0, 1e-9);
@@ -182,7 +171,7 @@ TEST(PointViewMatcher, APlaneLeavesTheFundamentalMatrixOpen)
     params.points.corners.max_corners = corners;
     const cv::Mat reference = texturedPicture(1);
     const cv::Mat current = disturbed(warpedPicture(reference, exampleHomography(), SIZE), 0.8, 10.0, 2.0);
-    const ViewMatch match = matchImages(params, reference, current, GeometryModel::FUNDAMENTAL);
+    const ViewMatch match = matchPoints(params, reference, current, GeometryModel::FUNDAMENTAL);
     EXPECT_EQ(match.outcome, MatchOutcome::NO_GEOMETRY) << corners << " corners: " << match.message;
     EXPECT_NE(match.message.find("look for a homography"), std::string::npos) << match.message;
   }
@@ -195,19 +184,19 @@ TEST(PointViewMatcher, SeveralHypothesesFindTheSameGeometryFromMoreMatches)
   const Book book;
   PointViewMatcherParams params;
   params.guided = false;
-  const ViewMatch plane = matchImages(params, reference, current);
-  const ViewMatch pages = matchImages(params, book.reference, book.current, GeometryModel::FUNDAMENTAL);
+  const ViewMatch plane = matchPoints(params, reference, current);
+  const ViewMatch pages = matchPoints(params, book.reference, book.current, GeometryModel::FUNDAMENTAL);
   ASSERT_EQ(plane.outcome, MatchOutcome::MATCHED);
   ASSERT_EQ(pages.outcome, MatchOutcome::MATCHED);
   for (const GeometryEstimator estimator : { GeometryEstimator::MULTI_HYPOTHESIS, GeometryEstimator::IMPORTANCE })
   {
     params.estimator = estimator;
     params.ransac.max_iterations = estimator == GeometryEstimator::IMPORTANCE ? 20000 : 2000;
-    const ViewMatch several = matchImages(params, reference, current);
+    const ViewMatch several = matchPoints(params, reference, current);
     ASSERT_EQ(several.outcome, MatchOutcome::MATCHED) << several.message;
     EXPECT_LT(cornerError(several.matrix, steepHomography(), SIZE), 3.0);
     EXPECT_GT(several.inliers, plane.inliers);
-    const ViewMatch of_pages = matchImages(params, book.reference, book.current, GeometryModel::FUNDAMENTAL);
+    const ViewMatch of_pages = matchPoints(params, book.reference, book.current, GeometryModel::FUNDAMENTAL);
     ASSERT_EQ(of_pages.outcome, MatchOutcome::MATCHED) << of_pages.message;
     EXPECT_GE(of_pages.inliers, pages.inliers);
     std::set<std::pair<double, double>> used;
@@ -238,7 +227,7 @@ TEST(PointViewMatcher, WorksWithUniformSamplingAndWithoutLocalOptimisation)
   params.ransac.sampling = view_servo::Sampling::UNIFORM;
   params.ransac.local_optimizations = 0;
   params.ransac.improvement_stage = true;
-  const ViewMatch match = matchImages(params, reference, current);
+  const ViewMatch match = matchPoints(params, reference, current);
   ASSERT_EQ(match.outcome, MatchOutcome::MATCHED);
   EXPECT_LT(cornerError(match.matrix, exampleHomography(), SIZE), 0.5);
 }
@@ -255,18 +244,18 @@ TEST(PointViewMatcher, FindsAViewThatIsMuchSmallerOrLarger)
   const cv::Mat current = warpedPicture(blurred, shrink, reference.size());
 
   PointViewMatcherParams params;
-  const ViewMatch smaller = matchImages(params, reference, current);
+  const ViewMatch smaller = matchPoints(params, reference, current);
   ASSERT_EQ(smaller.outcome, MatchOutcome::MATCHED) << smaller.message;
   EXPECT_GT(smaller.reference_level, smaller.current_level);
   EXPECT_LT(cornerError(smaller.matrix, shrink, reference.size()), 2.0);
 
-  const ViewMatch larger = matchImages(params, current, reference);
+  const ViewMatch larger = matchPoints(params, current, reference);
   ASSERT_EQ(larger.outcome, MatchOutcome::MATCHED) << larger.message;
   EXPECT_LT(larger.reference_level, larger.current_level);
   EXPECT_LT(cornerError(larger.matrix.inverse(), shrink, reference.size()), 2.0);
 
   params.scale_search = false;
-  EXPECT_EQ(matchImages(params, reference, current).outcome, MatchOutcome::NO_GEOMETRY);
+  EXPECT_EQ(matchPoints(params, reference, current).outcome, MatchOutcome::NO_GEOMETRY);
 }
 
 TEST(PointViewMatcher, FindsAPlaneThatIsSeenVeryObliquely)
@@ -289,12 +278,12 @@ TEST(PointViewMatcher, FindsAPlaneThatIsSeenVeryObliquely)
   const cv::Mat current = disturbed(averaged(reference, enlarge * h, size, OVER), 0.8, 10.0, 2.0);
 
   PointViewMatcherParams params;
-  const ViewMatch found = matchImages(params, reference, current);
+  const ViewMatch found = matchPoints(params, reference, current);
   ASSERT_EQ(found.outcome, MatchOutcome::MATCHED) << found.message;
   EXPECT_GE(found.reference_level, PreparedImage::SCALES);
   EXPECT_LT(cornerError(found.matrix, h, size), 5.0);
   params.side_search = false;
-  EXPECT_NE(matchImages(params, reference, current).outcome, MatchOutcome::MATCHED);
+  EXPECT_NE(matchPoints(params, reference, current).outcome, MatchOutcome::MATCHED);
 }
 
 TEST(PointViewMatcher, SaysWhenThereIsNothingToMatch)
@@ -302,7 +291,7 @@ TEST(PointViewMatcher, SaysWhenThereIsNothingToMatch)
   const cv::Mat flat(SIZE, CV_8UC1, cv::Scalar(90));
   for (const GeometryModel model : { GeometryModel::HOMOGRAPHY, GeometryModel::FUNDAMENTAL })
   {
-    const ViewMatch match = matchImages(PointViewMatcherParams(), texturedPicture(1), flat, model);
+    const ViewMatch match = matchPoints(PointViewMatcherParams(), texturedPicture(1), flat, model);
     EXPECT_EQ(match.outcome, MatchOutcome::TOO_FEW_FEATURES);
     EXPECT_NE(match.message.find("0 in the current image"), std::string::npos) << match.message;
     EXPECT_NE(match.message.find("the current image is nearly the same everywhere"), std::string::npos)
@@ -316,7 +305,7 @@ TEST(PointViewMatcher, TakesImagesOfDifferentSizes)
   const cv::Mat reference = texturedPicture(5);
   const cv::Size wide(620, 300);
   const ViewMatch match =
-      matchImages(PointViewMatcherParams(), reference, warpedPicture(reference, exampleHomography(), wide));
+      matchPoints(PointViewMatcherParams(), reference, warpedPicture(reference, exampleHomography(), wide));
   ASSERT_EQ(match.outcome, MatchOutcome::MATCHED);
   EXPECT_LT(cornerError(match.matrix, exampleHomography(), SIZE), 0.5);
 }
@@ -326,7 +315,7 @@ TEST(PointViewMatcher, LooksOnlyInTheRegionOfInterest)
   const cv::Mat reference = texturedPicture(6);
   const cv::Rect region(120, 60, 260, 240);
   const ViewMatch match =
-      matchImages(PointViewMatcherParams(), reference, warpedPicture(reference, exampleHomography(), SIZE),
+      matchPoints(PointViewMatcherParams(), reference, warpedPicture(reference, exampleHomography(), SIZE),
                   GeometryModel::HOMOGRAPHY, region);
   ASSERT_EQ(match.outcome, MatchOutcome::MATCHED);
   for (const MatchedPoint& point : match.matches)
@@ -341,9 +330,9 @@ TEST(PointViewMatcher, GivesTheSameResultEveryTime)
   const cv::Mat current = disturbed(warpedPicture(reference, exampleHomography(), SIZE), 0.9, 5.0, 3.0);
   const int threads = cv::getNumThreads();
   cv::setNumThreads(1);
-  const ViewMatch one = matchImages(PointViewMatcherParams(), reference, current);
+  const ViewMatch one = matchPoints(PointViewMatcherParams(), reference, current);
   cv::setNumThreads(3);
-  const ViewMatch three = matchImages(PointViewMatcherParams(), reference, current);
+  const ViewMatch three = matchPoints(PointViewMatcherParams(), reference, current);
   cv::setNumThreads(threads);
   EXPECT_EQ(one.matrix, three.matrix);
   ASSERT_EQ(one.matches.size(), three.matches.size());

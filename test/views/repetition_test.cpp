@@ -1,11 +1,8 @@
 // Copyright (c) 2026, the view_servo authors
 // SPDX-License-Identifier: BSD-3-Clause
 #include "support/corner_error.h"
+#include "support/matched_views.h"
 #include "support/textured_plane.h"
-#include "view_servo/views/line_view_matcher.h"
-#include "view_servo/views/point_view_matcher.h"
-#include "view_servo/views/prepared_image.h"
-#include "view_servo/views/scene_matcher.h"
 
 #include <gtest/gtest.h>
 #include <opencv2/core.hpp>
@@ -20,6 +17,8 @@ namespace view_servo
 {
 namespace
 {
+using test::MatchesOfAll;
+
 const cv::Size SIZE(640, 480);
 constexpr int PERIOD = 72;  // [px]
 
@@ -51,39 +50,25 @@ cv::Mat photographed(const cv::Mat& picture, double turn = 0.0)
   return test::disturbed(blurred, 1.0, 0.0, 2.0);
 }
 
-struct Answers
-{
-  ViewMatch points;
-  ViewMatch points_with_depth;
-  ViewMatch lines;
-  ViewMatch scene;
-};
-
-Answers answers(const cv::Mat& reference_image, const cv::Mat& current_image, bool unique = true)
+MatchesOfAll answers(const cv::Mat& reference, const cv::Mat& current, bool unique = true)
 {
   SceneMatcherParams params;
   params.points.unique = params.lines.unique = unique;
-  const SceneMatcher scene(params);
-  const PreparedImage reference(reference_image, cv::Rect(), scene.features());
-  const PreparedImage current(current_image, cv::Rect(), scene.features());
-  const PointViewMatcher points(params.points);
-  return { points.match(reference, current, GeometryModel::HOMOGRAPHY),
-           points.match(reference, current, GeometryModel::FUNDAMENTAL),
-           LineViewMatcher(params.lines).match(reference, current), scene.match(reference, current) };
+  return test::matchByAll(params, reference, current);
 }
 
 }  // namespace
 
-class RepeatedWindows : public testing::TestWithParam<std::uint64_t>
+class RepeatedWindowsTest : public testing::TestWithParam<std::uint64_t>
 {
 };
 
-TEST_P(RepeatedWindows, AreRefusedByAll)
+TEST_P(RepeatedWindowsTest, AreRefusedByAll)
 {
   // The camera has moved by one window: a match that is one window off is as good as the right one.
   const cv::Mat picture = wall(GetParam(), SIZE + cv::Size(PERIOD, 0));
-  const Answers found = answers(photographed(picture(cv::Rect(cv::Point(0, 0), SIZE))),
-                                photographed(picture(cv::Rect(cv::Point(PERIOD, 0), SIZE))));
+  const MatchesOfAll found = answers(photographed(picture(cv::Rect(cv::Point(0, 0), SIZE))),
+                                     photographed(picture(cv::Rect(cv::Point(PERIOD, 0), SIZE))));
   for (const ViewMatch& match : { found.points, found.points_with_depth, found.lines, found.scene })
   {
     EXPECT_EQ(match.outcome, MatchOutcome::NO_GEOMETRY) << match.message;
@@ -97,36 +82,36 @@ TEST_P(RepeatedWindows, AreRefusedByAll)
   EXPECT_NE(found.scene.message.find("repeats itself"), std::string::npos) << found.scene.message;
 }
 
-TEST_P(RepeatedWindows, AreRefusedByAllWhenTheCameraHasTurned)
+TEST_P(RepeatedWindowsTest, AreRefusedByAllWhenTheCameraHasTurned)
 {
   const cv::Mat picture = wall(GetParam(), SIZE + cv::Size(PERIOD, 0));
-  const Answers found = answers(photographed(picture(cv::Rect(cv::Point(0, 0), SIZE)), -2.0),
-                                photographed(picture(cv::Rect(cv::Point(PERIOD, 0), SIZE)), 2.0));
+  const MatchesOfAll found = answers(photographed(picture(cv::Rect(cv::Point(0, 0), SIZE)), -2.0),
+                                     photographed(picture(cv::Rect(cv::Point(PERIOD, 0), SIZE)), 2.0));
   for (const ViewMatch& match : { found.points, found.points_with_depth, found.lines, found.scene })
   {
     EXPECT_EQ(match.outcome, MatchOutcome::NO_GEOMETRY) << match.message;
   }
 }
 
-INSTANTIATE_TEST_SUITE_P(Walls, RepeatedWindows, testing::Values(1, 2, 3));
+INSTANTIATE_TEST_SUITE_P(Walls, RepeatedWindowsTest, testing::Values(1, 2, 3));
 
-TEST(Repetition, IsAllowedWhereThatIsAskedFor)
+TEST(RepeatedStructure, IsAllowedWhereThatIsAskedFor)
 {
   const cv::Mat picture = wall(1, SIZE);
-  const Answers found = answers(photographed(picture), photographed(picture), false);
+  const MatchesOfAll found = answers(photographed(picture), photographed(picture), false);
   for (const ViewMatch& match : { found.points, found.lines, found.scene })
   {
     EXPECT_EQ(match.outcome, MatchOutcome::MATCHED) << match.message;
   }
 }
 
-TEST(Repetition, IsNoneWhereMostOfTheViewIsUnique)
+TEST(RepeatedStructure, IsNoneWhereMostOfTheViewIsUnique)
 {
   // Windows between pictures of which each is another.
   cv::Mat picture = test::texturedPicture(7, SIZE);
   wall(1, cv::Size(4 * PERIOD, 3 * PERIOD)).copyTo(picture(cv::Rect(160, 120, 4 * PERIOD, 3 * PERIOD)));
   const Eigen::Matrix3d h = test::exampleHomography();
-  const Answers found = answers(photographed(picture), photographed(test::warpedPicture(picture, h, SIZE)));
+  const MatchesOfAll found = answers(photographed(picture), photographed(test::warpedPicture(picture, h, SIZE)));
   for (const ViewMatch& match : { found.points, found.lines, found.scene })
   {
     EXPECT_EQ(match.outcome, MatchOutcome::MATCHED) << match.message;

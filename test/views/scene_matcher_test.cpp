@@ -3,6 +3,7 @@
 #include "view_servo/views/scene_matcher.h"
 
 #include "support/corner_error.h"
+#include "support/matched_views.h"
 #include "support/room_corner.h"
 #include "support/textured_plane.h"
 #include "view_servo/geometry/fundamental.h"
@@ -16,21 +17,10 @@
 
 namespace view_servo
 {
-namespace
-{
-ViewMatch match(const cv::Mat& reference, const cv::Mat& current)
-{
-  const SceneMatcher matcher{ SceneMatcherParams() };
-  const FeatureParams features = matcher.features();
-  return matcher.match(PreparedImage(reference, cv::Rect(), features), PreparedImage(current, cv::Rect(), features));
-}
-
-}  // namespace
-
 TEST(SceneMatcher, FindsTheFundamentalMatrixOfARoomCorner)
 {
   const test::RoomCorner room;
-  const ViewMatch result = match(room.reference, room.current);
+  const ViewMatch result = test::matchScene(room.reference, room.current);
   ASSERT_EQ(result.outcome, MatchOutcome::MATCHED) << result.message;
   ASSERT_EQ(result.model, GeometryModel::FUNDAMENTAL) << result.message;
   double worst = 0.0;
@@ -62,7 +52,7 @@ TEST(SceneMatcher, SaysThatAPlaneIsOne)
 {
   const Eigen::Matrix3d h = test::exampleHomography();
   const cv::Mat reference = test::texturedPicture(5, test::PICTURE_SIZE);
-  const ViewMatch result = match(reference, test::viewThrough(reference, h));
+  const ViewMatch result = test::matchScene(reference, test::warpedPicture(reference, h));
   ASSERT_EQ(result.outcome, MatchOutcome::MATCHED) << result.message;
   EXPECT_EQ(result.model, GeometryModel::HOMOGRAPHY) << result.message;
   EXPECT_LT(test::cornerError(result.matrix, h, test::PICTURE_SIZE), 0.5);
@@ -100,7 +90,7 @@ TEST(SceneMatcher, EndsEarlyWhenGivenUp)
 TEST(SceneMatcher, SaysWhenNothingIsThere)
 {
   const cv::Mat grey(240, 320, CV_8UC1, cv::Scalar(128));
-  const ViewMatch result = match(grey, grey);
+  const ViewMatch result = test::matchScene(grey, grey);
   EXPECT_EQ(result.outcome, MatchOutcome::TOO_FEW_FEATURES);
   EXPECT_NE(result.message.find("too few corners"), std::string::npos) << result.message;
   EXPECT_NE(result.message.find("too few line segments"), std::string::npos) << result.message;
@@ -109,8 +99,8 @@ TEST(SceneMatcher, SaysWhenNothingIsThere)
 TEST(SceneMatcher, GivesTheSameAgain)
 {
   const test::RoomCorner room;
-  const ViewMatch first = match(room.reference, room.current);
-  const ViewMatch second = match(room.reference, room.current);
+  const ViewMatch first = test::matchScene(room.reference, room.current);
+  const ViewMatch second = test::matchScene(room.reference, room.current);
   EXPECT_EQ(first.matrix, second.matrix);
   EXPECT_EQ(first.inliers, second.inliers);
 }

@@ -2,9 +2,9 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "view_servo/views/scene_motion.h"
 
+#include "support/matched_views.h"
 #include "support/room_corner.h"
 #include "view_servo/views/prepared_image.h"
-#include "view_servo/views/scene_matcher.h"
 
 #include <gtest/gtest.h>
 #include <Eigen/Cholesky>
@@ -16,31 +16,11 @@
 
 namespace view_servo
 {
-namespace
-{
-Camera cameraOfTheRoom()
-{
-  Camera camera;
-  camera.width = 640;
-  camera.height = 480;
-  camera.distortion_model = "plumb_bob";
-  camera.k << 500.0, 0.0, 319.5, 0.0, 500.0, 239.5, 0.0, 0.0, 1.0;
-  return camera;
-}
-
-ViewMatch matchScene(const cv::Mat& reference, const cv::Mat& current)
-{
-  const SceneMatcher matcher{ SceneMatcherParams() };
-  return matcher.match(PreparedImage(reference, cv::Rect(), matcher.features()),
-                       PreparedImage(current, cv::Rect(), matcher.features()));
-}
-
-}  // namespace
-
 TEST(SceneMotion, IsThatOfTheCameraInARoom)
 {
   const test::RoomCorner room;
-  const auto motion = sceneMotion(matchScene(room.reference, room.current), cameraOfTheRoom(), cameraOfTheRoom());
+  const auto motion =
+      sceneMotion(test::matchScene(room.reference, room.current), test::roomCamera(), test::roomCamera());
   ASSERT_TRUE(motion);
   // As RoomCorner moves it.
   const Eigen::Matrix3d turn = Eigen::AngleAxisd(0.15, Eigen::Vector3d::UnitY()).toRotationMatrix();
@@ -53,7 +33,8 @@ TEST(SceneMotion, IsThatOfTheCameraInARoom)
 TEST(SceneMotion, HasACovarianceThatIsOne)
 {
   const test::RoomCorner room;
-  const auto motion = sceneMotion(matchScene(room.reference, room.current), cameraOfTheRoom(), cameraOfTheRoom());
+  const auto motion =
+      sceneMotion(test::matchScene(room.reference, room.current), test::roomCamera(), test::roomCamera());
   ASSERT_TRUE(motion);
   using Matrix6d = Eigen::Matrix<double, 6, 6>;
   const Matrix6d& covariance = motion->covariance;
@@ -70,17 +51,17 @@ TEST(SceneMotion, HasACovarianceThatIsOne)
 TEST(SceneMotion, IsNotToldOfAPlane)
 {
   const cv::Mat picture = test::texturedPicture(4, test::PICTURE_SIZE);
-  const ViewMatch match = matchScene(picture, test::viewThrough(picture, test::exampleHomography()));
+  const ViewMatch match = test::matchScene(picture, test::warpedPicture(picture, test::exampleHomography()));
   ASSERT_EQ(match.model, GeometryModel::HOMOGRAPHY);
-  EXPECT_FALSE(sceneMotion(match, cameraOfTheRoom(), cameraOfTheRoom()));
-  EXPECT_FALSE(sceneMotion(ViewMatch(), cameraOfTheRoom(), cameraOfTheRoom()));
+  EXPECT_FALSE(sceneMotion(match, test::roomCamera(), test::roomCamera()));
+  EXPECT_FALSE(sceneMotion(ViewMatch(), test::roomCamera(), test::roomCamera()));
 }
 
 TEST(SceneMotion, NeedsCalibratedCameras)
 {
   try
   {
-    sceneMotion(ViewMatch(), cameraOfTheRoom(), Camera());
+    sceneMotion(ViewMatch(), test::roomCamera(), Camera());
     FAIL() << "a camera without calibration is refused";
   }
   catch (const std::invalid_argument& error)

@@ -3,6 +3,7 @@
 #include "view_servo/views/view_recognizer.h"
 
 #include "support/temporary_directory.h"
+#include "support/text_file.h"
 #include "support/textured_plane.h"
 
 #include <gtest/gtest.h>
@@ -11,8 +12,6 @@
 
 #include <cstdint>
 #include <filesystem>
-#include <fstream>
-#include <iterator>
 #include <stdexcept>
 #include <string>
 #include <vector>
@@ -29,9 +28,11 @@ using view_servo::ViewRecognizerParams;
 using view_servo::ViewStore;
 using view_servo::test::disturbed;
 using view_servo::test::exampleHomography;
+using view_servo::test::readText;
 using view_servo::test::TemporaryDirectory;
 using view_servo::test::texturedPicture;
 using view_servo::test::warpedPicture;
+using view_servo::test::writeText;
 
 constexpr std::size_t ALL = 1000000;
 
@@ -159,7 +160,7 @@ TEST_F(ViewRecognizerTest, NamesADamagedViewOnceAndUsesTheOthers)
   {
     if (entry.path().filename().string().rfind("view5.", 0) == 0 && entry.path().extension() == ".png")
     {
-      std::ofstream(entry.path()) << "damaged";
+      writeText(entry.path(), "damaged");
     }
   }
   ViewRecognizer recognizer(storedViews(store_), params());
@@ -209,8 +210,7 @@ TEST_F(ViewRecognizerTest, ADamagedOrOldIndexIsMadeAnew)
   ViewRecognizer recognizer(storedViews(store_), params());
   recognizer.update(ALL);
   recognizer.saveIndex();
-  std::ifstream stream(recognizer.indexFile(), std::ios::binary);
-  const std::string good{ std::istreambuf_iterator<char>(stream), std::istreambuf_iterator<char>() };
+  const std::string good = readText(recognizer.indexFile());
   std::string flipped = good;
   flipped[good.size() / 2] ^= 1;
   std::string renamed = good;
@@ -218,7 +218,7 @@ TEST_F(ViewRecognizerTest, ADamagedOrOldIndexIsMadeAnew)
   for (const std::string& bad : { std::string(), good.substr(0, good.size() / 3), good.substr(0, good.size() - 1),
                                   flipped, renamed, "an older " + good })
   {
-    std::ofstream(recognizer.indexFile(), std::ios::binary) << bad;
+    writeText(recognizer.indexFile(), bad);
     ViewRecognizer other(storedViews(store_), params());
     EXPECT_NE(other.loadIndex().find("made anew"), std::string::npos);
     EXPECT_EQ(other.size(), 0U);
@@ -252,8 +252,8 @@ TEST_F(ViewRecognizerTest, FindsImageFiles)
   std::filesystem::create_directories(folder);
   cv::imwrite((folder / "one.png").string(), texturedPicture(1));
   cv::imwrite((folder / "two.PGM").string(), texturedPicture(2));
-  std::ofstream(folder / "notes.txt") << "not an image";
-  std::ofstream(folder / "bad.png") << "not an image either";
+  writeText(folder / "notes.txt", "not an image");
+  writeText(folder / "bad.png", "not an image either");
   ViewRecognizer recognizer(imageFiles(folder), params());
   const ViewRecognizer::Update update = recognizer.update(ALL);
   EXPECT_EQ(update.added, 2U);
