@@ -5,6 +5,7 @@
 #include "view_servo/robust/random.h"
 
 #include <gtest/gtest.h>
+#include <Eigen/Geometry>
 
 #include <cmath>
 

@@ -189,7 +189,7 @@ private:
   ros::Publisher joints_;
 };
 
-INSTANTIATE_TYPED_TEST_SUITE_P(Servo25d, EveryDriverTest, FakeArm);
+INSTANTIATE_TYPED_TEST_SUITE_P(Servo25d, EveryDriverTest, FakeArm, );
 
 class Servo25dNodeTest : public DriverTest<FakeArm>
 {

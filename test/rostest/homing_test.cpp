@@ -273,8 +273,8 @@ public:
   }
 };
 
-INSTANTIATE_TYPED_TEST_SUITE_P(Homing, EveryDriverTest, FakeBase);
-INSTANTIATE_TYPED_TEST_SUITE_P(HomingDifferential, EveryDriverTest, FakeDifferentialBase);
+INSTANTIATE_TYPED_TEST_SUITE_P(Homing, EveryDriverTest, FakeBase, );
+INSTANTIATE_TYPED_TEST_SUITE_P(HomingDifferential, EveryDriverTest, FakeDifferentialBase, );
 
 class HomingNodeTest : public DriverTest<FakeBase>
 {
