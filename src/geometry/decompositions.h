@@ -10,7 +10,8 @@
 namespace view_servo
 {
 /** @file
- * Decompositions of small matrices by Eigen. They are compiled in one place, as each takes a compiler seconds.
+ * Decompositions of matrices, and products of matrices of any size, by Eigen. Each is compiled in one place, as it takes a
+ * compiler seconds.
  */
 
 /** Of a symmetric matrix. */
@@ -50,5 +51,35 @@ extern template Eigen::Matrix<double, 7, 1> solveSymmetric(const Eigen::Matrix<d
                                                            const Eigen::Matrix<double, 7, 1>&);
 extern template Eigen::Matrix<double, 9, 1> solveSymmetric(const Eigen::Matrix<double, 9, 9>&,
                                                            const Eigen::Matrix<double, 9, 1>&);
+
+/** L D Lᵀ of a symmetric, positive semidefinite matrix of any size, its rows exchanged where that is more exact. */
+class SymmetricDecomposition
+{
+public:
+  explicit SymmetricDecomposition(const Eigen::MatrixXd& matrix);
+
+  /** The solution x of A x = b. */
+  Eigen::VectorXd solve(const Eigen::VectorXd& b) const;
+
+  Eigen::MatrixXd inverse() const;
+
+  /** Of D. */
+  Eigen::VectorXd diagonal() const;
+
+private:
+  Eigen::LDLT<Eigen::MatrixXd> ldlt_;
+};
+
+/** solveSymmetric() for any size. */
+Eigen::VectorXd solveSymmetric(const Eigen::MatrixXd& a, const Eigen::VectorXd& b);
+
+/** L⁻¹ of a covariance L Lᵀ that is positive definite: errors times it have a covariance of identity. */
+Eigen::MatrixXd whiteningOf(const Eigen::MatrixXd& covariance);
+
+/** a b. */
+Eigen::MatrixXd product(const Eigen::MatrixXd& a, const Eigen::MatrixXd& b);
+
+/** a x. */
+Eigen::VectorXd applied(const Eigen::MatrixXd& a, const Eigen::VectorXd& x);
 
 }  // namespace view_servo

@@ -1,0 +1,208 @@
+// Copyright (c) 2026, the view_servo authors
+// SPDX-License-Identifier: BSD-3-Clause
+#include "hand_eye_problem.h"
+
+#include "view_servo/geometry/rotation_vector.h"
+
+#include <Eigen/LU>
+
+#include <algorithm>
+
+namespace view_servo::hand_eye
+{
+namespace
+{
+Eigen::Matrix3d crossMatrix(const Eigen::Vector3d& v)
+{
+  Eigen::Matrix3d matrix;
+  matrix << 0.0, -v.z(), v.y(), v.z(), 0.0, -v.x(), -v.y(), v.x(), 0.0;
+  return matrix;
+}
+
+/** Two unit vectors square to a unit vector and to each other, as columns. */
+Eigen::Matrix<double, 3, 2> squareTo(const Eigen::Vector3d& unit)
+{
+  Eigen::Matrix<double, 3, 2> basis;
+  basis.col(0) = unit.unitOrthogonal();
+  basis.col(1) = unit.cross(basis.col(0));
+  return basis;
+}
+
+}  // namespace
+
+State moved(const State& state, const Eigen::VectorXd& step)
+{
+  State next = state;
+  next.camera_in_flange.translation() += step.segment<3>(0);
+  next.camera_in_flange.linear() = rotationFromVector(step.segment<3>(3)) * state.camera_in_flange.linear();
+  next.view_in_base.translation() += step.segment<3>(6);
+  next.view_in_base.linear() = rotationFromVector(step.segment<3>(9)) * state.view_in_base.linear();
+  next.normal = (state.normal + squareTo(state.normal) * step.segment<2>(12)).normalized();
+  next.distance = state.distance * std::exp(step(14));
+  return next;
+}
+
+Problem::Problem(const HandEyeView& view, const std::vector<HandEyePose>& poses, double distance)
+  : view_(view), known_distance_(distance)
+{
+  const Eigen::Matrix3d inverse = view.k.inverse();
+  for (const Eigen::Vector2d& corner : view.corners)
+  {
+    rays_.emplace_back(inverse * corner.homogeneous());
+  }
+  for (const HandEyePose& pose : poses)
+  {
+    Observation observation;
+    observation.base_in_flange = pose.flange_in_base.inverse();
+    observation.calibrated = calibratedHomography(pose.h, view.k, view.corners);
+    observation.corners.resize(ROWS);
+    for (int i = 0; i < CORNERS; ++i)
+    {
+      observation.corners.segment<2>(2 * i) =
+          (view.k * observation.calibrated * rays_[static_cast<std::size_t>(i)]).hnormalized();
+    }
+    observations_.push_back(observation);
+    decompositions_.push_back(decomposeHomography(pose.h, view.k, view.corners));
+  }
+}
+
+std::vector<Eigen::Vector3d> Problem::normals() const
+{
+  constexpr double FAR = 0.35;   // an angle beyond which homographies just disagree [rad]
+  constexpr double SAME = 0.25;  // between two answers that are one [rad]
+  struct Vote
+  {
+    Eigen::Vector3d normal;
+    double cost;
+  };
+  std::vector<Vote> votes;
+  for (const auto& candidates : decompositions_)
+  {
+    for (const EuclideanHomography& candidate : candidates)
+    {
+      if (!candidate.normal.allFinite())
+      {
+        continue;
+      }
+      double cost = 0.0;
+      for (const auto& others : decompositions_)
+      {
+        double least = FAR;
+        for (const EuclideanHomography& other : others)
+        {
+          if (other.normal.allFinite())
+          {
+            least = std::min(least, std::acos(std::clamp(candidate.normal.dot(other.normal), -1.0, 1.0)));
+          }
+        }
+        cost += least;
+      }
+      votes.push_back({ candidate.normal, cost });
+    }
+  }
+  std::stable_sort(votes.begin(), votes.end(), [](const Vote& a, const Vote& b) { return a.cost < b.cost; });
+  std::vector<Eigen::Vector3d> result;
+  for (const Vote& vote : votes)
+  {
+    if (result.empty() || (result.size() == 1 && result.front().dot(vote.normal) < std::cos(SAME)))
+    {
+      result.push_back(vote.normal);
+    }
+  }
+  return result;
+}
+
+std::vector<EuclideanHomography> Problem::motionsBefore(const Eigen::Vector3d& normal) const
+{
+  std::vector<EuclideanHomography> motions;
+  for (const Observation& observation : observations_)
+  {
+    motions.push_back(motionBefore(observation.calibrated, normal));
+  }
+  return motions;
+}
+
+bool Problem::errors(const State& state, std::size_t i, Eigen::VectorXd& errors) const
+{
+  errors.resize(ROWS);
+  const Eigen::Isometry3d camera_from_view =
+      state.camera_in_flange.inverse() * observations_[i].base_in_flange * state.view_in_base;
+  for (int corner = 0; corner < CORNERS; ++corner)
+  {
+    const Eigen::Vector3d& ray = rays_[static_cast<std::size_t>(corner)];
+    const double facing = state.normal.dot(ray);
+    const Eigen::Vector3d point = camera_from_view * Eigen::Vector3d(ray * (state.distance / facing));
+    if (!(facing > 0.0) || !(point.z() > 0.0))
+    {
+      return false;
+    }
+    errors.segment<2>(2 * corner) = (view_.k * point).hnormalized() - observations_[i].corners.segment<2>(2 * corner);
+  }
+  return errors.allFinite();
+}
+
+double Problem::squaredError(const State& state, std::size_t i) const
+{
+  Eigen::VectorXd difference;
+  return errors(state, i, difference) ? difference.squaredNorm() / CORNERS : ENDLESS;
+}
+
+void Problem::linearize(const State& state, std::size_t i, Eigen::MatrixXd& by_state, Eigen::MatrixXd& by_arm) const
+{
+  by_state.resize(ROWS, DOF);
+  by_arm.resize(ROWS, 6);
+  const Observation& observation = observations_[i];
+  const Eigen::Matrix3d camera_from_flange = state.camera_in_flange.linear().transpose();
+  const Eigen::Matrix3d camera_from_base = camera_from_flange * observation.base_in_flange.linear();
+  const Eigen::Matrix<double, 3, 2> basis = squareTo(state.normal);
+  for (int corner = 0; corner < CORNERS; ++corner)
+  {
+    const Eigen::Vector3d& ray = rays_[static_cast<std::size_t>(corner)];
+    const double facing = state.normal.dot(ray);
+    const Eigen::Vector3d in_view = ray * (state.distance / facing);
+    const Eigen::Vector3d turned = state.view_in_base.linear() * in_view;
+    const Eigen::Vector3d in_flange = observation.base_in_flange * (state.view_in_base * in_view);
+    const Eigen::Vector3d in_camera = state.camera_in_flange.inverse() * in_flange;
+
+    const Eigen::Vector3d pixel = view_.k * in_camera;
+    Eigen::Matrix<double, 2, 3> projection;
+    projection << view_.k.row(0) / pixel.z() - view_.k.row(2) * (pixel.x() / (pixel.z() * pixel.z())),
+        view_.k.row(1) / pixel.z() - view_.k.row(2) * (pixel.y() / (pixel.z() * pixel.z()));
+
+    Eigen::Matrix<double, 3, DOF> point;
+    point.block<3, 3>(0, 0) = -camera_from_flange;
+    point.block<3, 3>(0, 3) = camera_from_flange * crossMatrix(in_flange - state.camera_in_flange.translation());
+    point.block<3, 3>(0, 6) = camera_from_base;
+    point.block<3, 3>(0, 9) = -camera_from_base * crossMatrix(turned);
+    const Eigen::Vector3d farther = camera_from_base * turned;
+    point.col(12) = farther * (-ray.dot(basis.col(0)) / facing);
+    point.col(13) = farther * (-ray.dot(basis.col(1)) / facing);
+    point.col(14) = farther;
+    by_state.middleRows<2>(2 * corner) = projection * point;
+
+    Eigen::Matrix<double, 3, 6> moved;
+    moved.leftCols<3>() = -camera_from_flange;
+    moved.rightCols<3>() = camera_from_flange * crossMatrix(in_flange);
+    by_arm.middleRows<2>(2 * corner) = projection * moved;
+  }
+}
+
+double Problem::distanceWeight() const
+{
+  constexpr double EXACT = 1e10;  // one over the square of 1e-5, for one pixel of error in images
+  return std::isnan(known_distance_) ? 0.0 : EXACT;
+}
+
+double Problem::distanceError(const State& state) const
+{
+  return std::isnan(known_distance_) ? 0.0 : std::log(state.distance / known_distance_);
+}
+
+double medianOf(std::vector<double> values)
+{
+  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
+  std::nth_element(values.begin(), middle, values.end());
+  return *middle;
+}
+
+}  // namespace view_servo::hand_eye

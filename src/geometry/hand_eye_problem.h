@@ -1,0 +1,116 @@
+// Copyright (c) 2026, the view_servo authors
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include "view_servo/geometry/euclidean_homography.h"
+#include "view_servo/geometry/hand_eye.h"
+
+#include <Eigen/Core>
+#include <Eigen/Geometry>
+
+#include <cmath>
+#include <cstddef>
+#include <limits>
+#include <vector>
+
+namespace view_servo
+{
+/** What the parts of calibrateHandEye() share. */
+namespace hand_eye
+{
+constexpr double NONE = std::numeric_limits<double>::quiet_NaN();
+constexpr double ENDLESS = std::numeric_limits<double>::infinity();
+constexpr double DEGREES = 180.0 / M_PI;
+constexpr int CORNERS = 4;
+constexpr int ROWS = 2 * CORNERS;  // of a pose's errors
+constexpr int DOF = 15;            // camera on flange, view in base, direction and distance of the plane
+constexpr int LEAST_POSES = 6;
+
+using Indices = std::vector<std::size_t>;
+
+/** What is unknown. */
+struct State
+{
+  Eigen::Isometry3d camera_in_flange;
+  Eigen::Isometry3d view_in_base;
+  Eigen::Vector3d normal;
+  double distance;
+};
+
+/**
+ * A state after a step (DOF x 1): camera on flange, place [m] and rotation [rad] along the flange's axes; view in base likewise;
+ * direction of the plane [rad]; logarithm of its distance.
+ */
+State moved(const State& state, const Eigen::VectorXd& step);
+
+/** A pose, prepared. */
+struct Observation
+{
+  Eigen::Isometry3d base_in_flange;
+  Eigen::Matrix3d calibrated;  ///< R + (t / d) nᵀ
+  Eigen::VectorXd corners;     ///< where the image has the view's corners [px], ROWS x 1
+};
+
+/** Poses, and the errors of a state in them. */
+class Problem
+{
+public:
+  /** @param view has to outlive this. @param distance of the plane from the view's camera [m]; NaN: not known. */
+  Problem(const HandEyeView& view, const std::vector<HandEyePose>& poses, double distance);
+
+  std::size_t size() const
+  {
+    return observations_.size();
+  }
+
+  const Observation& observation(std::size_t i) const
+  {
+    return observations_[i];
+  }
+
+  /** Of the plane from the view's camera [m]; NaN: not known. */
+  double knownDistance() const
+  {
+    return known_distance_;
+  }
+
+  /**
+   * The direction of the plane on which most homographies agree, and the second best when it is another one: which of two
+   * is true may be left open by the images, not by the arm.
+   */
+  std::vector<Eigen::Vector3d> normals() const;
+
+  /** Of the camera at each pose from the view, before a plane with that normal. */
+  std::vector<EuclideanHomography> motionsBefore(const Eigen::Vector3d& normal) const;
+
+  /** Where the view's corners should be, less where they are [px], ROWS x 1. False when a corner is behind the camera. */
+  bool errors(const State& state, std::size_t i, Eigen::VectorXd& errors) const;
+
+  /** Mean squared distance of a pose's corners from where they should be [px²]. */
+  double squaredError(const State& state, std::size_t i) const;
+
+  /**
+   * Derivatives of errors() by the state, in the order of moved() (ROWS x DOF), and by the flange's place and rotation along
+   * its own axes (ROWS x 6) [px per m or rad].
+   */
+  void linearize(const State& state, std::size_t i, Eigen::MatrixXd& by_state, Eigen::MatrixXd& by_arm) const;
+
+  /** Weight of distanceError(): with a known distance so large that it holds, else none. */
+  double distanceWeight() const;
+
+  /** Logarithm of the distance over the one that is known. */
+  double distanceError(const State& state) const;
+
+private:
+  const HandEyeView& view_;
+  double known_distance_;
+  std::vector<Eigen::Vector3d> rays_;  // of the view's corners, z = 1
+  std::vector<Observation> observations_;
+  std::vector<std::vector<EuclideanHomography>> decompositions_;
+};
+
+/** The value in the middle of some. */
+double medianOf(std::vector<double> values);
+
+}  // namespace hand_eye
+}  // namespace view_servo
