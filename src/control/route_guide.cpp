@@ -62,7 +62,7 @@ RouteGuide::RouteGuide(const RouteGuideParams& params, std::vector<RouteStop> st
 {
   if (stops_.empty())
   {
-    throw std::invalid_argument("a way without views");
+    throw std::logic_error("a way without views");
   }
 }
 

@@ -55,7 +55,7 @@ public:
     : context_(context),
       params_(params),
       routes_(viewsDir(params.views_dir)),
-      loader_("reading the next view of a route", [this](Order&& order) { load(order); }),
+      worker_("reading the next view of a route", [this](Order&& order) { load(order); }),
       homing_(context, params_,
               { {},
                 [this] { onOdometry(); },
@@ -263,7 +263,7 @@ private:
     next_.reset();
     if (!guide_->last())
     {
-      loader_.put([this](Order& order) { order = { context_.goalId(), guide_->next(), frame_ }; });
+      worker_.put([this](Order& order) { order = { context_.goalId(), guide_->next(), frame_ }; });
     }
   }
 
@@ -326,7 +326,7 @@ private:
   std::shared_ptr<HomingTask> next_;  // to the view after this one, once it is read
   CameraFrame frame_;
   // Their threads use what is above, and each other only while a goal runs.
-  Worker<Order> loader_;
+  Worker<Order> worker_;
   ViewHoming homing_;
 };
 

@@ -75,16 +75,18 @@ std::vector<std::string> HomingDriverParams::validate() const
   return faults.list();
 }
 
-std::vector<Parameter> parameters(RouteFollowerParams& params)
+std::vector<Parameter> homingParameters(RouteFollowerParams& params)
 {
   const std::set<std::string> others = { "view", "mode", "step", "near_step", "step_speed" };
-  std::vector<Parameter> rows = joined({
-      parameters(params.guide),
-      parameters(static_cast<HomingDriverParams&>(params)),
-  });
+  std::vector<Parameter> rows = parameters(static_cast<HomingDriverParams&>(params));
   rows.erase(std::remove_if(rows.begin(), rows.end(), [&](const Parameter& row) { return others.count(row.name) > 0; }),
              rows.end());
   return rows;
+}
+
+std::vector<Parameter> parameters(RouteFollowerParams& params)
+{
+  return joined({ parameters(params.guide), homingParameters(params) });
 }
 
 std::vector<std::string> RouteFollowerParams::validate() const

@@ -82,6 +82,9 @@ struct RouteFollowerParams : HomingDriverParams
 
 std::vector<Parameter> parameters(RouteFollowerParams& params);
 
+/** The same without those of the guide. */
+std::vector<Parameter> homingParameters(RouteFollowerParams& params);
+
 /** Parameters of the node servo_25d. */
 struct ServoDriverParams
 {
