@@ -25,6 +25,10 @@ std::vector<Parameter> parameters(RouteGuideParams& params)
     real("handover_distance", params.handover_distance, "m", "> 0",
          "as near to a view that is not the goal's, the base goes on to the next one"),
     real("handover_turn", params.handover_turn, "rad", "> 0", "largest yaw error at that"),
+    real("handover_displacement", params.handover_displacement, "px", "> 0",
+         "it goes on, too, where the view's points are so near to their places, in the median, as the distance may not "
+         "be "
+         "known in metres"),
     real("blind_distance", params.blind_distance, "m", ">= 0",
          "how far a holonomic base goes on by odometry until the next view is found; then it stands and waits"),
     real("blind_turn", params.blind_turn, "rad", ">= 0", "how far it turns by odometry until then"),
@@ -68,8 +72,8 @@ RouteGuide::RouteGuide(const RouteGuideParams& params, std::vector<RouteStop> st
 
 void RouteGuide::see(const HomingReport& report, const PlanarPose& base)
 {
-  const bool in_place = report.state == HomingState::DOCKING || report.state == HomingState::ARRIVED;
-  found_ = in_place || report.state == HomingState::APPROACHING || report.state == HomingState::NEAR;
+  found_ = report.state == HomingState::APPROACHING || report.state == HomingState::NEAR ||
+           report.state == HomingState::DOCKING || report.state == HomingState::ARRIVED;
   due_ = false;
   if (!found_)
   {
@@ -80,6 +84,7 @@ void RouteGuide::see(const HomingReport& report, const PlanarPose& base)
   {
     return;
   }
+  const bool in_place = report.displacement <= params_.handover_displacement || report.state == HomingState::ARRIVED;
   if (report.goal_in_odom)
   {
     goal_ = report.goal_in_odom;

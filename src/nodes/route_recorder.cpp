@@ -13,6 +13,7 @@
 #include "view_servo/ros/readiness.h"
 #include "view_servo/ros/transform_source.h"
 #include "view_servo/ros/worker.h"
+#include "view_servo/tracking/pair_structure.h"
 #include "view_servo/tracking/route_spacing.h"
 #include "view_servo/views/route_store.h"
 
@@ -28,6 +29,7 @@
 #include <stdexcept>
 #include <string>
 #include <utility>
+#include <vector>
 
 namespace view_servo
 {
@@ -86,6 +88,9 @@ private:
   struct Recording
   {
     Route route;
+    StoredView before;                      ///< the view before the last
+    StoredView last;                        ///< the last view
+    CameraMount mount;                      ///< where the camera is on the base
     std::unique_ptr<RouteSpacing> spacing;  ///< from the last view on
     std::string fault;                      ///< why the route cannot be stored any more; empty: it can
   };
@@ -216,6 +221,7 @@ private:
         addChecked(place);
       }
       checkGoesOn();
+      learnLast();
       if (route.stops.size() < 2)
       {
         throw std::runtime_error("the base has not moved");
@@ -307,8 +313,8 @@ private:
     view.camera = toCamera(*place.frame.info);
     view.stamp = header.stamp.toSec();
     view.frame_id = header.frame_id;
-    auto spacing = std::make_unique<RouteSpacing>(params_.spacing, view.image, *view.camera,
-                                                  CameraMount(toIsometry(mount.transform)));
+    recording_->mount = CameraMount(toIsometry(mount.transform));
+    auto spacing = std::make_unique<RouteSpacing>(params_.spacing, view.image, *view.camera, recording_->mount);
     if (const std::string warning = routes_.views().save(view, false); !warning.empty())
     {
       ROS_WARN_STREAM(warning);
@@ -316,6 +322,42 @@ private:
     route.stops.push_back({ view.name, place.base, view.stamp });
     recording_->spacing = std::move(spacing);
     ROS_INFO_STREAM("stored view '" << view.name << "'");
+    if (route.stops.size() > 1)
+    {
+      const PlanarPose moved = compose(inverse(route.stops[route.stops.size() - 2].base), place.base);
+      learn(recording_->last, view, moved);
+      recording_->before = std::move(recording_->last);
+    }
+    recording_->last = std::move(view);
+  }
+
+  /** Of the last view, from the one before. */
+  void learnLast()
+  {
+    const std::vector<RouteStop>& stops = recording_->route.stops;
+    if (stops.size() > 1)
+    {
+      learn(recording_->last, recording_->before, compose(inverse(stops.back().base), stops[stops.size() - 2].base));
+    }
+  }
+
+  /**
+   * Stores where the things are that a view shows, so that a follower knows it from the start; that this fails is no fault of the
+   * route. @param moved pose of the base at the other view in the base at this one.
+   */
+  void learn(const StoredView& view, const StoredView& other, const PlanarPose& moved) const
+  {
+    guarded("learning view '" + view.name + "'", [&] {
+      const bool same_camera = view.camera->k == other.camera->k && view.image.size() == other.image.size();
+      const ViewStructure structure =
+          same_camera ? structureOfPair(view.image, other.image, *view.camera, recording_->mount, moved)
+                      : ViewStructure();
+      if (!structure.points.empty())
+      {
+        routes_.views().saveStructure(view.name, routes_.views().revision(view.name), structure);
+      }
+      ROS_INFO_STREAM("view '" << view.name << "': the depths of " << structure.points.size() << " points are stored");
+    });
   }
 
   /** Ends the recording, and removes its views. */

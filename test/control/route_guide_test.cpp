@@ -114,6 +114,10 @@ TEST(RouteGuide, GoesOnWhereThePointsAreInPlace)
   const PlanarPose base{ 1.0, 1.0, 0.0 };
   HomingReport report = trackedReport(base, compose(base, { 2.0, 0.0, 0.0 }), false);  // by a wrong scale
   report.state = HomingState::DOCKING;
+  report.displacement = 20.0;
+  guide.see(report, base);
+  EXPECT_FALSE(guide.due());
+  report.displacement = 4.0;
   guide.see(report, base);
   ASSERT_TRUE(guide.due());
   guide.goOn();

@@ -85,14 +85,29 @@ protected:
     removeViews("route_recorder");
   }
 
-  /** Of the base, in the world. */
-  PlanarPose truth() const
+  /** Of a camera, with x along its axis; the base's camera is above its middle. */
+  static PlanarPose onFloor(const geometry_msgs::Pose& camera)
   {
-    const geometry_msgs::Pose camera = truth_.last()->pose;
     const Eigen::Quaterniond turn(camera.orientation.w, camera.orientation.x, camera.orientation.y,
                                   camera.orientation.z);
     const Eigen::Vector3d axis = turn * Eigen::Vector3d::UnitZ();
     return { camera.position.x, camera.position.y, std::atan2(axis.y(), axis.x()) };
+  }
+
+  /** The true pose, in the world. */
+  PlanarPose truth() const
+  {
+    return onFloor(truth_.last()->pose);
+  }
+
+  PlanarPose truthAt(const ros::Time& stamp) const
+  {
+    PlanarPose pose;
+    for (const geometry_msgs::PoseStamped& message : truth_.messages())
+    {
+      pose = message.header.stamp <= stamp ? onFloor(message.pose) : pose;
+    }
+    return pose;
   }
 
   /** Puts the camera where it is when the base is there, and waits until an image shows it. */
@@ -149,6 +164,7 @@ protected:
       return;
     }
     putAt(BEGIN);
+    hall_begin = truth();
     ASSERT_EQ(start("hall"), "route 'hall' is recorded from view 'hall_001' on, until ~stop");
     drive(END.x - BEGIN.x, END.y - BEGIN.y);
     const std::string answer = stop();
@@ -205,7 +221,8 @@ protected:
     ASSERT_TRUE(waitUntil([this] { return commands_.moving(); })) << reason();
   }
 
-  static PlanarPose hall_end;  // where the base was when its last view was stored
+  static PlanarPose hall_begin;  // where the base was when its first view was stored
+  static PlanarPose hall_end;    // and its last
 
   using Client = actionlib::SimpleActionClient<FollowRouteAction>;
   ros::NodeHandle nh_;
@@ -225,6 +242,7 @@ protected:
   ros::Subscriber info_subscriber_;
 };
 
+PlanarPose RoutesTest::hall_begin;
 PlanarPose RoutesTest::hall_end;
 
 TEST_F(RoutesTest, RecordsViewsAlongTheWay)
@@ -287,6 +305,7 @@ TEST_F(RoutesTest, FollowsARouteToItsExactEnd)
 {
   recordHall();
   putAt({ -2.05, 0.05, 0.04 });
+  const ros::Time begin = ros::Time::now();
   send("hall");
   const FollowRouteResult final = result();
   ASSERT_TRUE(final.success) << final.message;
@@ -295,19 +314,48 @@ TEST_F(RoutesTest, FollowsARouteToItsExactEnd)
   EXPECT_LT(std::abs(off.yaw), 1.0 * DEGREE);
   EXPECT_GT(final.travelled, 2.0);
   EXPECT_LT(final.travelled, 3.0);
+  const Route route = store_->load("hall");
   std::set<std::string> views;
-  double farthest = 0.0;
-  const std::lock_guard<std::mutex> lock(mutex_);
-  for (const FollowRouteFeedback& feedback : feedback_)
   {
-    views.insert(feedback.view);
-    farthest = std::isfinite(feedback.sideways) ? std::max(farthest, std::abs(feedback.sideways)) : farthest;
+    const std::lock_guard<std::mutex> lock(mutex_);
+    for (const FollowRouteFeedback& feedback : feedback_)
+    {
+      views.insert(feedback.view);
+    }
   }
-  EXPECT_EQ(views.size(), store_->load("hall").stops.size());
-  EXPECT_LT(farthest, 0.3);
+  EXPECT_EQ(views.size(), route.stops.size());
+
+  // The true way: beside the line, and where one view after another was left.
+  const PlanarPose line{ hall_begin.x, hall_begin.y, std::atan2(hall_end.y - hall_begin.y, hall_end.x - hall_begin.x) };
+  const auto recorded = [&](std::size_t i) {
+    return compose(hall_begin, compose(inverse(route.stops[0].base), route.stops[i].base));
+  };
+  double farthest = 0.0;
+  for (const geometry_msgs::PoseStamped& message : truth_.messages())
+  {
+    if (message.header.stamp > begin)
+    {
+      farthest = std::max(farthest, std::abs(compose(inverse(line), onFloor(message.pose)).y));
+    }
+  }
+  double earliest = 0.0;
+  for (const WantedView& wanted : wanted_.messages())
+  {
+    for (std::size_t i = 1; i < route.stops.size() && wanted.header.stamp > begin; ++i)
+    {
+      if (wanted.view == route.stops[i].view)
+      {
+        earliest = std::max(earliest, compose(inverse(recorded(i - 1)), truthAt(wanted.header.stamp)).distance());
+      }
+    }
+  }
+  EXPECT_LT(farthest, 0.15);
+  EXPECT_LT(earliest, 0.4) << "a view is left before the base is near it";
   EXPECT_TRUE(waitUntil([this] { return wanted_.last()->view.empty(); }));
-  std::printf("[ MEASURED ] %.1f mm and %.2f degrees off, at most %.0f mm beside the line, %.2f m in %.0f s\n",
-              1e3 * off.distance(), off.yaw / DEGREE, 1e3 * farthest, final.travelled, final.duration);
+  std::printf(
+      "[ MEASURED ] %.1f mm and %.2f degrees off, at most %.0f mm beside the line and %.0f mm before a view that is "
+      "left, %.2f m in %.0f s\n",
+      1e3 * off.distance(), off.yaw / DEGREE, 1e3 * farthest, 1e3 * earliest, final.travelled, final.duration);
 }
 
 TEST_F(RoutesTest, FollowsAPartOfARouteInReverse)

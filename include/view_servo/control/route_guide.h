@@ -21,8 +21,10 @@ struct RouteGuideParams
 {
   double handover_distance = 0.3;  ///< as near to a view, the next one is driven to [m]
   double handover_turn = 0.15;     ///< largest yaw error at that [rad]
-  double blind_distance = 0.5;     ///< longest way by odometry until the next view is found [m]
-  double blind_turn = 0.35;        ///< largest turn by odometry until then [rad]
+  /** The next view is driven to also where the median displacement of this one's points is as small [px]. */
+  double handover_displacement = 5.0;
+  double blind_distance = 0.5;  ///< longest way by odometry until the next view is found [m]
+  double blind_turn = 0.35;     ///< largest turn by odometry until then [rad]
 };
 
 /** Names, units and ranges of these parameters. */
