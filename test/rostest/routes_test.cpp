@@ -6,6 +6,8 @@
 #include "node_test.h"
 
 #include "view_servo/FollowRouteAction.h"
+#include "view_servo/PointMatches.h"
+#include "view_servo/RecognizedViews.h"
 #include "view_servo/SetPose.h"
 #include "view_servo/StartRoute.h"
 #include "view_servo/WantedView.h"
@@ -63,6 +65,14 @@ protected:
             infos_.publish(message);
           }
         }));
+    matches_subscriber_ =
+        nh_.subscribe<PointMatches>("point_matcher/point_matches", 5,
+                                    boost::function<void(const PointMatches::ConstPtr&)>([this](const auto& message) {
+                                      if (message->view != unmatched_)
+                                      {
+                                        matches_.publish(message);
+                                      }
+                                    }));
     ASSERT_TRUE(waitForService("route_recorder/stop") && waitForService("route_follower/enable"));
     ASSERT_TRUE(
         waitUntil([this] { return client_.isServerConnected() && truth_.last() && drive_.getNumSubscribers() > 0; }));
@@ -238,6 +248,9 @@ protected:
   Client client_{ "follow", false };
   std::mutex mutex_;
   std::deque<FollowRouteFeedback> feedback_;
+  std::string unmatched_;  // the matches of this view are not handed on
+  ros::Publisher matches_ = nh_.advertise<PointMatches>("seen/point_matches", 5);
+  ros::Subscriber matches_subscriber_;
   ros::Subscriber image_subscriber_;
   ros::Subscriber info_subscriber_;
 };
@@ -395,6 +408,60 @@ TEST_F(RoutesTest, StopsWhenTheCameraStops)
   EXPECT_TRUE(waitUntil([this] { return commands_.moving(); })) << reason();
   camera_ = false;
   EXPECT_FALSE(result().success) << "it gives up";
+}
+
+TEST_F(RoutesTest, BeginsAtTheViewThatARecognizerSees)
+{
+  recordHall();
+  const std::string seen = store_->load("hall").stops[3].view;
+  ros::Publisher recognizer = nh_.advertise<RecognizedViews>("recognized", 1);
+  ASSERT_TRUE(waitUntil([&] { return !wanted_.last() || wanted_.last()->view.empty(); }));
+  send("hall");
+  const ros::Time begin = ros::Time::now();
+  EXPECT_TRUE(
+      waitUntil([&] { return wanted_.last() && wanted_.last()->header.stamp > begin && !wanted_.last()->view.empty(); },
+                [&] {
+                  RecognizedViews message;
+                  message.header.stamp = ros::Time::now();
+                  message.views.resize(3);
+                  message.views[0].view = "elsewhere";
+                  message.views[0].verified = 1;
+                  message.views[1].view = "hall_002";
+                  message.views[2].view = seen;
+                  message.views[2].verified = 1;
+                  recognizer.publish(message);
+                }));
+  EXPECT_EQ(wanted_.last()->view, seen) << "neither one that is not on the route, nor one that is not verified";
+  client_.cancelGoal();
+  EXPECT_FALSE(result().success);
+}
+
+/** The matcher says nothing of one view. */
+class UnmatchedTest : public RoutesTest
+{
+protected:
+  UnmatchedTest()
+  {
+    unmatched_ = "hall_002";
+  }
+};
+
+TEST_F(UnmatchedTest, GoesOnByOdometryNoFartherThanItMay)
+{
+  constexpr double BLIND_DISTANCE = 0.5;  // the default [m]
+  constexpr double BRAKING = 0.05;        // [m]
+  recordHall();
+  putAt({ -2.05, 0.1, 0.0 });
+  send("hall");
+  ASSERT_TRUE(waitUntil([&] { return wanted_.last() && wanted_.last()->view == unmatched_; })) << reason();
+  const PlanarPose begin = truth();
+  EXPECT_TRUE(waitUntil([&] { return reason().find("goes on by odometry") != std::string::npos; })) << reason();
+  const FollowRouteResult final = result();
+  EXPECT_FALSE(final.success);
+  EXPECT_NE(final.message.find("view 'hall_002', 2 of "), std::string::npos) << final.message;
+  const double gone = compose(inverse(begin), truth()).distance();
+  EXPECT_GT(gone, 0.1);
+  EXPECT_LT(gone, BLIND_DISTANCE + BRAKING);
 }
 
 TEST_F(RoutesTest, RefusesBeforeAnythingMoves)
