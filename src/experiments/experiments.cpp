@@ -20,6 +20,7 @@
 #include "experiments/profile_experiments.h"
 #include "experiments/recognition_experiment.h"
 #include "experiments/rooms_experiment.h"
+#include "experiments/routes_experiment.h"
 #include "experiments/structure_experiment.h"
 #include "tools/command_line.h"
 #include "view_servo/parameters/error_text.h"
@@ -69,6 +70,7 @@ const std::vector<Experiment>& experiments()
       runHomingDifferentialExperiment },
     { "homing_structure", "homing with what was learnt of the view in an earlier run, and without", false,
       STRUCTURE_STARTS, runStructureExperiment },
+    { "routes", "routes through simulated rooms, recorded and followed", false, ROUTES, runRoutesExperiment },
     { "arm", "table 8.1: servoing of a simulated arm, from many starts", false, ARM_RUNS, runArmExperiment },
     { "homing_directions", "the heading between real views of a room", true, DIRECTION_DRAWS, runDirectionsExperiment },
     { "multi_hypothesis", "table 9.1, figures 9.1 to 9.6: several hypotheses a point, simulated", false,

@@ -1,44 +1,15 @@
 // Copyright (c) 2026, the view_servo authors
 // SPDX-License-Identifier: BSD-3-Clause
+#include "sim_ros/base_run.h"
 #include "sim_ros/simulated_run.h"
 #include "view_servo/HomeToViewAction.h"
-#include "view_servo/geometry/planar_pose.h"
 
-#include <cmath>
-#include <cstdio>
-#include <sstream>
-#include <stdexcept>
 #include <string>
 
 namespace view_servo
 {
 namespace
 {
-/** "x y yaw" [m, m, rad] in the world, or the name of one of its starts; yaw may be left out. */
-Eigen::Isometry3d parseStart(const sim::World& world, const std::string& text)
-{
-  std::istringstream stream(text);
-  double x = 0.0;
-  double y = 0.0;
-  double yaw = 0.0;
-  if (!(stream >> x >> y))
-  {
-    return world.start(text);
-  }
-  if (!(stream >> yaw) && !stream.eof())
-  {
-    throw std::invalid_argument("start: '" + text + "' is neither \"x y yaw\" nor a start's name");
-  }
-  return sim::planarPose(x, y, yaw);
-}
-
-/** The pose on the floor of a camera: x along its axis. */
-PlanarPose onFloor(const Eigen::Isometry3d& camera)
-{
-  const Eigen::Vector3d axis = camera.linear().col(2);
-  return { camera.translation().x(), camera.translation().y(), std::atan2(axis.y(), axis.x()) };
-}
-
 RunOutcome run(ros::NodeHandle& nh, const sim::World& world, const RunParams& params)
 {
   SimulatedRun<HomeToViewAction> simulation(nh, params, "nomad_sim", "homing", "home");
@@ -51,13 +22,7 @@ RunOutcome run(ros::NodeHandle& nh, const sim::World& world, const RunParams& pa
   order.view = params.view;
   order.timeout = params.timeout;
   const HomeToViewResult result = simulation.drive(order);
-  const PlanarPose off = compose(inverse(onFloor(goal)), onFloor(simulation.rest()));
-  char text[200];
-  std::snprintf(text, sizeof(text),
-                "the base is %.1f mm and %.2f degrees from where the view was stored (%.1f mm ahead, %.1f mm to the "
-                "left), after %.2f m in %.1f s",
-                1e3 * off.distance(), off.yaw * 180.0 / M_PI, 1e3 * off.x, 1e3 * off.y, result.travelled,
-                result.duration);
+  const std::string text = describeEnd(goal, simulation.rest(), result.travelled, result.duration);
   const bool success = result.success != 0;
   return { success, std::string(success ? "arrived" : "not arrived") + " (" + result.message + "): " + text };
 }

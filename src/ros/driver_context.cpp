@@ -117,6 +117,14 @@ void DriverContext::requestView(const std::string& view)
   });
 }
 
+void DriverContext::requestNextView(const std::string& view)
+{
+  if (!goalId().empty())
+  {
+    publishWantedView(view, goalId());
+  }
+}
+
 void DriverContext::requestIdleView(const std::string& view)
 {
   if (goalId().empty())

@@ -5,6 +5,9 @@
 #include "view_servo/parameters/faults.h"
 #include "view_servo/ros/image_source.h"
 
+#include <algorithm>
+#include <set>
+
 namespace view_servo
 {
 namespace
@@ -69,6 +72,29 @@ std::vector<std::string> HomingDriverParams::validate() const
   faults.add(faultsOf(camera));
   faults.add(homing.validate());
   faults.add(limits.validate());
+  return faults.list();
+}
+
+std::vector<Parameter> homingParameters(RouteFollowerParams& params)
+{
+  const std::set<std::string> others = { "view", "mode", "step", "near_step", "step_speed" };
+  std::vector<Parameter> rows = parameters(static_cast<HomingDriverParams&>(params));
+  rows.erase(std::remove_if(rows.begin(), rows.end(), [&](const Parameter& row) { return others.count(row.name) > 0; }),
+             rows.end());
+  return rows;
+}
+
+std::vector<Parameter> parameters(RouteFollowerParams& params)
+{
+  return joined({ parameters(params.guide), homingParameters(params) });
+}
+
+std::vector<std::string> RouteFollowerParams::validate() const
+{
+  RouteGuideParams copy = guide;
+  Faults faults;
+  faults.add(faultsOf(parameters(copy)));
+  faults.add(HomingDriverParams::validate());
   return faults.list();
 }
 

@@ -71,4 +71,29 @@ std::vector<std::string> ViewRecognizerNodeParams::validate() const
   return faults.list();
 }
 
+std::vector<Parameter> parameters(RouteRecorderParams& params)
+{
+  return joined({
+      parameters(params.spacing),
+      {
+          viewsDirParameter(params.views_dir),
+          text("base_frame", params.base_frame,
+               "the base's frame, whose pose odometry is; tf must know where the camera is in it"),
+          real("odometry_delay", params.odometry_delay, "s", "[-2, 2]",
+               "how much later than images of the same moment odometry is stamped: it is taken away from odometry's "
+               "stamps"),
+          real("patience", params.patience, "s", "> 0", "longest wait of ~start and ~stop for an image and odometry"),
+      },
+      parameters(params.camera),
+  });
+}
+
+std::vector<std::string> RouteRecorderParams::validate() const
+{
+  Faults faults;
+  faults.require(!base_frame.empty(), "base_frame must not be empty");
+  faults.add(faultsOf(*this));
+  return faults.list();
+}
+
 }  // namespace view_servo

@@ -34,6 +34,15 @@ inline RunParams homingRunParams()
   return params;
 }
 
+/** The defaults of a base on a route. */
+inline RunParams routeRunParams()
+{
+  RunParams params = homingRunParams();
+  params.start = "-2 0";
+  params.timeout = 300.0;
+  return params;
+}
+
 /** Names, units, ranges and meanings of those that are read. */
 inline std::vector<Parameter> parameters(RunParams& params)
 {
@@ -41,7 +50,7 @@ inline std::vector<Parameter> parameters(RunParams& params)
     text("world", params.world, "a world's file, or the name of one in config/worlds/"),
     text("start", params.start,
          "where the robot starts, one of the world's starts; for a base also \"x y yaw\" [m, m, rad]"),
-    text("view", params.view, "name under which the view is stored"),
+    text("view", params.view, "name under which the view, or the route, is stored"),
     real("timeout", params.timeout, "s", "> 0", "time limit of the goal"),
     real("patience", params.patience, "s", "> 0", "longest wait for another node"),
     text("result", params.result, "file that the outcome is written to; empty: none"),

@@ -162,6 +162,42 @@ public:
     return *result;
   }
 
+  /**
+   * Calls a service. roscpp gives its calls no deadline, and one whose other side hangs or resets the connection may
+   * never return. So the call is made by a thread of its own that shares nothing with this object; when it takes too
+   * long the whole process ends, without destroying anything that the thread may still use.
+   * @throws std::runtime_error when the answer is no.
+   */
+  template <typename Service>
+  void call(const std::string& name, Service& service)
+  {
+    struct Call
+    {
+      Service service;
+      std::atomic<bool> has_ended = { false };
+      bool was_answered = false;  // valid once it has ended
+    };
+    const std::string resolved = nh_.resolveName(name);
+    const std::shared_ptr<Call> shared = std::make_shared<Call>();
+    shared->service = service;
+    std::thread([shared, resolved] {
+      guarded("calling " + resolved, [&] { shared->was_answered = callService(resolved, shared->service); });
+      shared->has_ended = true;
+    }).detach();
+    const std::string missing = waitUntilReady(params_.patience, [&]() -> std::string {
+      return shared->has_ended ? "" : "there is no answer of the service " + resolved;
+    });
+    if (!missing.empty())
+    {
+      params_.give_up(ros::ok() ? "waited in vain: " + missing : "interrupted");
+    }
+    service = shared->service;
+    if (!shared->was_answered || service.response.success == 0)
+    {
+      throw std::runtime_error(resolved + ": " + (shared->was_answered ? service.response.message : "the call failed"));
+    }
+  }
+
 private:
   using Clock = std::chrono::steady_clock;
 
@@ -213,42 +249,6 @@ private:
   {
     const std::lock_guard<std::mutex> lock(mutex_);
     return status_.empty() ? "nothing" : "'" + status_ + "'";
-  }
-
-  /**
-   * Calls a service. roscpp gives its calls no deadline, and one whose other side hangs or resets the connection may
-   * never return. So the call is made by a thread of its own that shares nothing with this object; when it takes too
-   * long the whole process ends, without destroying anything that the thread may still use.
-   * @throws std::runtime_error when the answer is no.
-   */
-  template <typename Service>
-  void call(const std::string& name, Service& service)
-  {
-    struct Call
-    {
-      Service service;
-      std::atomic<bool> has_ended = { false };
-      bool was_answered = false;  // valid once it has ended
-    };
-    const std::string resolved = nh_.resolveName(name);
-    const std::shared_ptr<Call> shared = std::make_shared<Call>();
-    shared->service = service;
-    std::thread([shared, resolved] {
-      guarded("calling " + resolved, [&] { shared->was_answered = callService(resolved, shared->service); });
-      shared->has_ended = true;
-    }).detach();
-    const std::string missing = waitUntilReady(params_.patience, [&]() -> std::string {
-      return shared->has_ended ? "" : "there is no answer of the service " + resolved;
-    });
-    if (!missing.empty())
-    {
-      params_.give_up(ros::ok() ? "waited in vain: " + missing : "interrupted");
-    }
-    service = shared->service;
-    if (!shared->was_answered || service.response.success == 0)
-    {
-      throw std::runtime_error(resolved + ": " + (shared->was_answered ? service.response.message : "the call failed"));
-    }
   }
 
   /** Waits until the goal has ended. @return why it has not; empty when it has. */

@@ -4,6 +4,7 @@
 
 #include "sim/renderer.h"
 #include "sim/visibility.h"
+#include "trials/evidence.h"
 #include "trials/trial.h"
 #include "view_servo/views/line_view_matcher.h"
 #include "view_servo/views/point_view_matcher.h"
@@ -96,24 +97,6 @@ HomingTrials::~HomingTrials() = default;
 
 namespace
 {
-/** What a matcher finds in an image. */
-struct StampedEvidence
-{
-  double stamp;  // [s]
-  HeadingEvidence pixels;
-};
-
-StampedEvidence toEvidence(double stamp, const ViewMatch& match)
-{
-  StampedEvidence result{ stamp, {} };
-  for (const MatchedPoint& point : match.matches)
-  {
-    result.pixels.pairs.push_back(point.position);
-    result.pixels.weights.push_back(point.score);
-  }
-  return result;
-}
-
 struct StampedImage
 {
   double stamp;  // [s]

@@ -3,29 +3,20 @@
 #include "view_servo/views/view_store.h"
 
 #include "camera_yaml.h"
+#include "stored_files.h"
 #include "view_servo/images/image_io.h"
-#include "view_servo/images/regular_file.h"
 #include "view_servo/parameters/error_text.h"
 
 #include <yaml-cpp/yaml.h>
 #include <opencv2/imgcodecs.hpp>
 
-#include <fcntl.h>
-#include <sys/file.h>
-#include <unistd.h>
-
 #include <algorithm>
-#include <cerrno>
-#include <chrono>
 #include <cmath>
 #include <cstdint>
 #include <limits>
-#include <sstream>
 #include <stdexcept>
 #include <string>
 #include <string_view>
-#include <system_error>
-#include <thread>
 
 namespace view_servo
 {
@@ -35,32 +26,6 @@ namespace fs = std::filesystem;
 
 constexpr int FORMAT = 1;
 constexpr std::size_t MAX_NAME_LENGTH = 64;
-
-/** The last line of a yaml file is this and the checksum of all text above it. */
-constexpr std::string_view CHECKSUM_KEY = "checksum: ";
-
-/** What is wrong with a view's files; without its name, which whoever catches it knows. */
-class Damage : public std::runtime_error
-{
-public:
-  using std::runtime_error::runtime_error;
-};
-
-/** FNV-1a, 64 bits, in hexadecimal: finds every changed byte, and tells two images of a view apart. */
-std::string checksum(std::string_view bytes)
-{
-  std::uint64_t hash = 0xcbf29ce484222325U;
-  for (const char byte : bytes)
-  {
-    hash = (hash ^ static_cast<unsigned char>(byte)) * 0x100000001b3U;
-  }
-  std::ostringstream text;
-  text << std::hex;
-  text.width(16);
-  text.fill('0');
-  text << hash;
-  return text.str();
-}
 
 fs::path yamlPath(const fs::path& directory, const std::string& name)
 {
@@ -79,127 +44,11 @@ std::string imageFileName(const std::string& name, std::string_view png)
   return name + "." + checksum(png) + ".png";
 }
 
-[[noreturn]] void throwLastError(const fs::path& path)
-{
-  throw std::system_error(errno, std::generic_category(), path.string());
-}
-
-/** A file descriptor that closes itself. */
-class Descriptor
-{
-public:
-  Descriptor(const fs::path& path, int flags) : path_(path), fd_(::open(path.c_str(), flags | O_CLOEXEC, 0666))
-  {
-    if (fd_ < 0)
-    {
-      throwLastError(path_);
-    }
-  }
-  ~Descriptor()
-  {
-    ::close(fd_);
-  }
-  Descriptor(const Descriptor&) = delete;
-  Descriptor& operator=(const Descriptor&) = delete;
-
-  void write(std::string_view bytes) const
-  {
-    while (!bytes.empty())
-    {
-      const ssize_t written = ::write(fd_, bytes.data(), bytes.size());
-      if (written < 0 && errno != EINTR)
-      {
-        throwLastError(path_);
-      }
-      bytes.remove_prefix(static_cast<std::size_t>(std::max<ssize_t>(written, 0)));
-    }
-  }
-
-  int get() const
-  {
-    return fd_;
-  }
-
-  void sync() const
-  {
-    if (::fsync(fd_) != 0)
-    {
-      throwLastError(path_);
-    }
-  }
-
-private:
-  fs::path path_;
-  int fd_;
-};
-
-void syncDirectory(const fs::path& directory)
-{
-  Descriptor(directory, O_RDONLY | O_DIRECTORY).sync();
-}
-
-/**
- * After this the file holds either what it held before or all of `bytes`, whatever happens in between. Its directory has to
- * be synced before it is certain which of the two.
- */
-void replaceFile(const fs::path& path, std::string_view bytes)
-{
-  const fs::path temporary = path.string() + ".tmp";
-  try
-  {
-    const Descriptor file(temporary, O_WRONLY | O_CREAT | O_TRUNC);
-    file.write(bytes);
-    file.sync();
-    fs::rename(temporary, path);
-  }
-  catch (...)
-  {
-    std::error_code ignored;  // the first error is the one to tell
-    fs::remove(temporary, ignored);
-    throw;
-  }
-}
-
-/** Only one process at a time changes a directory's views; others wait. Readers do not take part. */
-class DirectoryLock
-{
-public:
-  /** @throws std::runtime_error when another process holds it for too long. */
-  explicit DirectoryLock(const fs::path& directory) : file_(directory / ".lock", O_RDWR | O_CREAT)
-  {
-    constexpr std::chrono::seconds PATIENCE(10);
-    constexpr std::chrono::milliseconds POLL(5);
-    const auto deadline = std::chrono::steady_clock::now() + PATIENCE;
-    while (::flock(file_.get(), LOCK_EX | LOCK_NB) != 0)
-    {
-      if (errno != EWOULDBLOCK && errno != EINTR)
-      {
-        return;  // a file system without locks: alone, nothing can happen
-      }
-      if (std::chrono::steady_clock::now() > deadline)
-      {
-        throw std::runtime_error("another process has been changing views in " + directory.string() + " for too long");
-      }
-      std::this_thread::sleep_for(POLL);
-    }
-  }
-
-private:
-  Descriptor file_;  // the lock ends with it
-};
-
-/** Empty when there is no such file. */
+/** Empty when there is no such file. @throws Damage. */
 std::optional<std::string> readFile(const fs::path& path)
 {
   constexpr std::uintmax_t LARGEST = 4 * MAX_IMAGE_PIXELS;  // no view needs more [bytes]
-  try
-  {
-    return readRegularFile(path, LARGEST);
-  }
-  catch (const std::runtime_error& error)
-  {
-    throw Damage(path.string() + ": " + oneLine(error));
-  }
+  return readStoredFile(path, LARGEST);
 }
 
 /** Whether a file is one that a view of this name had, or that was on its way to become one: all others are somebody else's. */
@@ -348,11 +197,6 @@ ViewPose poseFromYaml(const YAML::Node& node)
   return pose;
 }
 
-std::string withChecksum(const std::string& text)
-{
-  return text + std::string(CHECKSUM_KEY) + checksum(text) + "\n";
-}
-
 /** All of a view but its pixels. */
 std::string toYamlText(const StoredView& view, const std::string& image_file)
 {
@@ -377,23 +221,6 @@ std::string toYamlText(const StoredView& view, const std::string& image_file)
   }
   yaml << YAML::EndMap << YAML::Newline;
   return withChecksum(std::string(yaml.c_str(), yaml.size()));
-}
-
-/** Whether the text is, to the byte, what withChecksum() wrote. */
-bool hasGoodChecksum(const std::string& text)
-{
-  const std::size_t end = text.rfind(CHECKSUM_KEY);
-  return end != std::string::npos && text == withChecksum(text.substr(0, end));
-}
-
-/** The text before the last line. @throws Damage when that is not, to the byte, what withChecksum() wrote. */
-std::string withoutChecksum(const std::string& text, const std::string& what)
-{
-  if (!hasGoodChecksum(text))
-  {
-    throw Damage(what + " does not agree with the checksum in its last line");
-  }
-  return text.substr(0, text.rfind(CHECKSUM_KEY));
 }
 
 /** @throws Damage when the text is not, to the byte, what toYamlText() wrote. */
@@ -466,27 +293,14 @@ std::optional<StoredView> readView(const fs::path& directory, const std::string&
 /** Sorted names of the views that have a yaml file, readable or not. @throws ViewStoreError. */
 std::vector<std::string> findNames(const fs::path& directory)
 {
-  std::vector<std::string> names;
   try
   {
-    if (!fs::exists(directory))
-    {
-      return names;
-    }
-    for (const fs::directory_entry& entry : fs::directory_iterator(directory))
-    {
-      if (entry.path().extension() == ".yaml" && isValidViewName(entry.path().stem().string()))
-      {
-        names.push_back(entry.path().stem().string());
-      }
-    }
+    return namesOfYamlFiles(directory);
   }
   catch (const fs::filesystem_error& error)
   {
     throw ViewStoreError(std::string("cannot list views: ") + oneLine(error));
   }
-  std::sort(names.begin(), names.end());
-  return names;
 }
 
 void requireValidName(const std::string& action, const std::string& name)

@@ -94,7 +94,8 @@ class Documented(unittest.TestCase):
         wanted = [
             (["nomad_sim.launch", "homing.launch"], ["/nomad_sim/set_pose", "/homing/enable", "/view_store/save",
                                                      "/point_matcher/match", "/line_matcher/match",
-                                                     "/scene_matcher/match", "/view_recognizer/recognize"]),
+                                                     "/scene_matcher/match", "/view_recognizer/recognize",
+                                                     "/route_recorder/start", "/route_follower/enable"]),
             (["puma_sim.launch", "arm_servo.launch"], ["/puma_sim/set_pose", "/servo_25d/enable", "/view_store/save",
                                                        "/homography_tracker/start"]),
         ]
@@ -108,6 +109,8 @@ class Documented(unittest.TestCase):
         # The drivers' launch files leave it out.
         cls.graphs[0].start("rosrun", PACKAGE, "scene_matcher", "image_raw:=camera/image_raw", "camera_info:=camera/camera_info",
                             "wanted_view:=homing/wanted_view")
+        for node in ("route_recorder", "route_follower"):
+            cls.graphs[0].start("rosrun", PACKAGE, node, "image_raw:=camera/image_raw", "camera_info:=camera/camera_info")
         hand_eye = os.path.join(cls.directory, "mounted.yaml")
         with open(hand_eye, "w") as file:
             yaml.safe_dump({"parameters": {"eye_on_hand": True, "robot_base_frame": "other_base", "robot_effector_frame": "other_flange",
@@ -585,7 +588,7 @@ class Documented(unittest.TestCase):
         """Services, actions and topics have the types, and the direction, that the tables say."""
         count = 0
         nodes = set()
-        for row in self.document("docs/nodes.md").rows + self.document("docs/simulation.md").rows:
+        for row in [row for name in ("nodes", "routes", "simulation") for row in self.document("docs/%s.md" % name).rows]:
             if row.head[0] not in ("service", "action, service", "topic"):
                 continue
             section = re.fullmatch(r"`(\w+)`", row.section)

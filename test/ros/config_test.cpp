@@ -44,6 +44,8 @@ public:
   LineMatcherParams lines;
   SceneMatcherParams scene;
   HomingDriverParams homing;
+  RouteFollowerParams follower;
+  RouteRecorderParams route_recorder;
   HomographyTrackerNodeParams tracker;
   ServoDriverParams servo;
   ViewStoreNodeParams store;
@@ -52,6 +54,7 @@ public:
   sim::NomadParams nomad;
   sim::PumaParams puma;
   RunParams homing_run = homingRunParams();
+  RunParams route_run = routeRunParams();
   RunParams arm_run;
 
   Tables()
@@ -80,6 +83,10 @@ public:
           { "recognition; its verification has the parameters of scene_matcher as well",
             recognitionParameters(recognizer.recognition) } } },
       { "homing", { { "the node, homing and the base", parameters(homing) } } },
+      { "route_follower",
+        { { "when it goes on to the next view", parameters(follower.guide) },
+          { "the node, homing and the base, as of homing", homingParameters(follower) } } },
+      { "route_recorder", { { "the node", parameters(route_recorder) } } },
       { "homography_tracker", { { "the node and tracking", parameters(tracker) } } },
       { "servo_25d", { { "the node, servoing and the camera's motion", parameters(servo) } } },
     };
@@ -99,6 +106,10 @@ public:
           { "## Homography tracker", parameters(tracker) },
           { "## 2.5D servoing", parameters(servo) },
           { "## View store", parameters(store) } } },
+      { "routes",
+        { { "## Parameters of `route_recorder`", parameters(route_recorder) },
+          { "## Parameters of `route_follower`", parameters(follower.guide) },
+          { "## Parameters of `run_route`", parameters(route_run) } } },
       { "simulation",
         { { "## Parameters of both", parameters(simulation) },
           { "## Parameters of `nomad_sim`", parameters(nomad) },
@@ -252,6 +263,8 @@ TEST(Config, DefaultsAreValidAndNamesUnique)
   EXPECT_EQ(tables.lines.validate(), std::vector<std::string>());
   EXPECT_EQ(tables.scene.validate(), std::vector<std::string>());
   EXPECT_EQ(tables.homing.validate(), std::vector<std::string>());
+  EXPECT_EQ(tables.follower.validate(), std::vector<std::string>());
+  EXPECT_EQ(tables.route_recorder.validate(), std::vector<std::string>());
   EXPECT_EQ(tables.tracker.validate(), std::vector<std::string>());
   EXPECT_EQ(tables.servo.validate(), std::vector<std::string>());
 }

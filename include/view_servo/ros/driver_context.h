@@ -235,6 +235,9 @@ public:
   /** Publishes on `~wanted_view` the view of the goal that is being prepared. Only for prepare(), without the mutex. */
   void requestView(const std::string& view);
 
+  /** Publishes on `~wanted_view` that the goal goes on to another view, if there is a goal. The mutex is held. */
+  void requestNextView(const std::string& view);
+
   /** Publishes that a view is wanted without a goal, unless there is a goal; empty: none. The mutex is held. */
   void requestIdleView(const std::string& view);
 

@@ -3,6 +3,7 @@
 #pragma once
 
 #include "view_servo/control/homing.h"
+#include "view_servo/control/route_guide.h"
 #include "view_servo/control/servo_25d.h"
 #include "view_servo/control/velocity_limiter.h"
 #include "view_servo/ros/camera_input.h"
@@ -65,6 +66,24 @@ struct HomingDriverParams
 };
 
 std::vector<Parameter> parameters(HomingDriverParams& params);
+
+/** Parameters of the node route_follower: those of homing, but for the ones of a single view and of mode `thesis`. */
+struct RouteFollowerParams : HomingDriverParams
+{
+  RouteGuideParams guide;
+
+  RouteFollowerParams()
+  {
+    node.timeout = 600.0;
+  }
+
+  std::vector<std::string> validate() const;
+};
+
+std::vector<Parameter> parameters(RouteFollowerParams& params);
+
+/** The same without those of the guide. */
+std::vector<Parameter> homingParameters(RouteFollowerParams& params);
 
 /** Parameters of the node servo_25d. */
 struct ServoDriverParams

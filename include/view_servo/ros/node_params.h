@@ -6,9 +6,11 @@
 #include "view_servo/ros/camera_input.h"
 #include "view_servo/ros/image_source.h"
 #include "view_servo/ros/session_starter.h"
+#include "view_servo/tracking/route_spacing.h"
 #include "view_servo/views/point_view_matcher.h"
 #include "view_servo/views/view_recognizer.h"
 
+#include <filesystem>
 #include <string>
 #include <vector>
 
@@ -59,5 +61,21 @@ std::vector<Parameter> parameters(ViewRecognizerNodeParams& params);
 
 /** The same without those of the recognition. */
 std::vector<Parameter> nodeParameters(ViewRecognizerNodeParams& params);
+
+/** Parameters of the node route_recorder. */
+struct RouteRecorderParams
+{
+  CameraInputParams camera;
+  std::filesystem::path views_dir;       ///< directory of the stored views; empty: as viewsDir() says
+  std::string base_frame = "base_link";  ///< tf frame of the base, whose pose odometry is
+  double odometry_delay = 0.0;           ///< odometry's stamps are later than images' of the same moment by this [s]
+  double patience = 5.0;                 ///< longest wait of ~start and ~stop for an image and odometry [s]
+  RouteSpacingParams spacing;
+
+  /** Each fault in one line, those of nested parameters included; empty when the parameters are usable. */
+  std::vector<std::string> validate() const;
+};
+
+std::vector<Parameter> parameters(RouteRecorderParams& params);
 
 }  // namespace view_servo

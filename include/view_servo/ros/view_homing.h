@@ -1,0 +1,180 @@
+// Copyright (c) 2026, the view_servo authors
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include "view_servo/ServoStatus.h"
+#include "view_servo/control/course.h"
+#include "view_servo/control/homing.h"
+#include "view_servo/control/motion_watch.h"
+#include "view_servo/control/velocity_limiter.h"
+#include "view_servo/ros/base_output.h"
+#include "view_servo/ros/camera_input.h"
+#include "view_servo/ros/driver_context.h"
+#include "view_servo/ros/driver_params.h"
+#include "view_servo/ros/homing_worker.h"
+#include "view_servo/ros/odometry_input.h"
+#include "view_servo/ros/transform_source.h"
+#include "view_servo/ros/view_answer.h"
+#include "view_servo/views/view_store.h"
+
+#include "view_servo/PointMatch.h"
+
+#include <diagnostic_updater/DiagnosticStatusWrapper.h>
+#include <std_msgs/Header.h>
+
+#include <chrono>
+#include <functional>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+namespace view_servo
+{
+/**
+ * What the drivers of a mobile base share: inputs, the thread that works on them, and the course that this leaves. It
+ * homes to one view at a time, the one of its task, and whoever owns it decides which.
+ *
+ * Subscribes `image_raw`, `camera_info` (see CameraInput), `point_matches` (view_servo/PointMatches), `line_matches`
+ * (view_servo/LineMatches), `odom` (nav_msgs/Odometry) and tf; publishes what BaseOutput does.
+ *
+ * Unless something else is said, members are called with the mutex of the DriverContext held. As its threads call the
+ * hooks, it has to be the last member of its owner, so that it is destroyed first.
+ */
+class ViewHoming
+{
+public:
+  /** What the owner does besides. All may be empty. */
+  struct Hooks
+  {
+    std::function<void()> on_frame;          ///< after each image that can be used; mutex held
+    std::function<void()> on_odometry;       ///< after each reading of odometry that is the newest; mutex held
+    std::function<void()> on_image_outcome;  ///< after the work on an image of the task; mutex held
+    std::function<void(const HomingOutcome&)> on_work;  ///< after each piece of work, by its thread; not held
+    std::function<void(const CameraFrame&)> on_frame_without_task;  ///< by the worker's thread; not held
+  };
+
+  /** References to `context` and `params` are kept. */
+  ViewHoming(DriverContext& context, const HomingDriverParams& params, Hooks hooks);
+
+  // ------------------------------------------------------------------- for prepare(): they wait, without the mutex
+
+  /** Asks matchers for a view, and waits for an image that is new, odometry and tf. @throws what waitFor() throws. */
+  CameraFrame waitForInputs(const std::string& view);
+  /** Waits until a matcher has answered. @throws std::runtime_error also when all refuse the view. */
+  void waitForAnswer();
+
+  // ------------------------------------------------------------------------------------------- with or without it
+
+  /** @throws std::runtime_error saying why homing to the view by such frames cannot be. */
+  std::shared_ptr<HomingTask> makeTask(const LearntView& stored, const CameraFrame& frame,
+                                       const HomingParams& params) const;
+  const ViewStore& store() const
+  {
+    return store_;
+  }
+  /** Of the base. */
+  const std::string& frame() const
+  {
+    return base_frame_;
+  }
+
+  // ------------------------------------------------------------------------------------------------- with the mutex
+
+  /** Which view, for which goal, matches have to be about from now on; empty: none. */
+  void want(const std::string& view, const std::string& goal);
+  /** Replaces the task, and forgets all that belongs to the old one; null: no task. */
+  void setTask(std::shared_ptr<HomingTask> task);
+  /** Whether the base may move without matches although the view's points are not tracked; until setTask(). */
+  void setDoesWithoutMatches(bool does);
+  /** The way travelled counts from here. */
+  void restartWay()
+  {
+    travelled_ = 0.0;
+  }
+
+  const std::shared_ptr<HomingTask>& task() const
+  {
+    return task_;
+  }
+  const HomingReport& report() const
+  {
+    return report_;
+  }
+  /** The newest pose in odometry's frame; empty before the first. */
+  const std::optional<PlanarPose>& base() const
+  {
+    return base_in_odom_;
+  }
+  /** By odometry, since restartWay() [m]. */
+  double travelled() const
+  {
+    return travelled_;
+  }
+
+  /** The velocity along a course by the newest odometry; zero from the first image whose stamp is apart from odometry's on. */
+  BaseVelocity follow(const Course& course) const;
+  /** The same along the course of homing. */
+  BaseVelocity wanted() const
+  {
+    return follow(course_);
+  }
+
+  // See DriverNode.
+  void sent(double time, const BaseVelocity& velocity)
+  {
+    motion_.addCommand(time, velocity);
+  }
+  bool hasListener() const
+  {
+    return output_.hasListener();
+  }
+  void publish(const BaseVelocity& velocity) const
+  {
+    output_.publish(velocity);
+  }
+  std::optional<double> takeLatency();
+  void fill(ServoStatus& status) const;
+  void diagnose(diagnostic_updater::DiagnosticStatusWrapper& status) const;
+
+private:
+  using Clock = std::chrono::steady_clock;
+
+  std::string odometryLacks() const;
+  void needMatches(bool needed);
+  void endIfTimeWentBack(const DriverInput& input);
+  void onFrame(const CameraFrame& frame);
+  void onOdometry(const nav_msgs::Odometry& message);
+  void onMatches(bool wanted, const std_msgs::Header& header, const std::vector<PointMatch>& matches);
+  void onOutcome(const HomingOutcome& outcome);
+
+  DriverContext& context_;
+  const HomingDriverParams& params_;
+  const Hooks hooks_;
+  const std::string base_frame_;
+  DriverInput& images_;
+  DriverInput& outcomes_;
+  TransformSource transforms_;
+  OdometryInput odometry_;
+  DriverInput& matches_;
+  ViewAnswer points_;
+  ViewAnswer lines_;
+  const ViewStore store_;
+  const BaseOutput output_;
+
+  std::shared_ptr<HomingTask> task_;  // the newest
+  HomingReport report_;
+  Course course_;
+  std::optional<PlanarPose> base_in_odom_;
+  MotionWatch motion_;
+  double travelled_ = 0.0;
+  int odd_stamps_ = 0;
+  bool matches_needed_ = true;
+  bool does_without_matches_ = false;
+  std::optional<Clock::time_point> unanswered_;  // when an image came that was worked on, until a command follows
+
+  HomingWorker worker_;
+  CameraInput camera_;
+};
+
+}  // namespace view_servo

@@ -1,0 +1,165 @@
+// Copyright (c) 2026, the view_servo authors
+// SPDX-License-Identifier: BSD-3-Clause
+#include "view_servo/control/route_guide.h"
+
+#include <algorithm>
+#include <cmath>
+#include <stdexcept>
+#include <utility>
+
+namespace view_servo
+{
+namespace
+{
+/** The pose of one stop's base in another's, as recorded. */
+PlanarPose relative(const RouteStop& from, const RouteStop& to)
+{
+  return compose(inverse(from.base), to.base);
+}
+
+}  // namespace
+
+std::vector<Parameter> parameters(RouteGuideParams& params)
+{
+  return {
+    real("handover_distance", params.handover_distance, "m", "> 0",
+         "as near to a view that is not the goal's, the base goes on to the next one"),
+    real("handover_turn", params.handover_turn, "rad", "> 0", "largest yaw error at that"),
+    real("handover_displacement", params.handover_displacement, "px", "> 0",
+         "it goes on, too, where the view's points are so near to their places, in the median, as the distance may not "
+         "be "
+         "known in metres"),
+    real("blind_distance", params.blind_distance, "m", ">= 0",
+         "how far a holonomic base goes on by odometry until the next view is found; then it stands and waits"),
+    real("blind_turn", params.blind_turn, "rad", ">= 0", "how far it turns by odometry until then"),
+  };
+}
+
+std::vector<RouteStop> stopsBetween(const Route& route, const std::string& start, const std::string& goal, bool reverse)
+{
+  std::vector<RouteStop> stops = route.stops;
+  if (reverse)
+  {
+    std::reverse(stops.begin(), stops.end());
+  }
+  const auto find = [&](const std::string& view) {
+    const auto found =
+        std::find_if(stops.begin(), stops.end(), [&](const RouteStop& stop) { return stop.view == view; });
+    if (found == stops.end())
+    {
+      throw std::invalid_argument("view '" + view + "' is not on route '" + route.name + "'");
+    }
+    return found;
+  };
+  const auto first = start.empty() ? stops.begin() : find(start);
+  const auto last = goal.empty() ? stops.end() - 1 : find(goal);
+  if (last < first)
+  {
+    throw std::invalid_argument("view '" + last->view + "' comes before view '" + first->view + "' on route '" +
+                                route.name + (reverse ? "' in reverse" : "'; reverse: true drives backwards"));
+  }
+  return { first, last + 1 };
+}
+
+RouteGuide::RouteGuide(const RouteGuideParams& params, std::vector<RouteStop> stops, double blind_speed)
+  : params_(params), stops_(std::move(stops)), blind_speed_(blind_speed)
+{
+  if (stops_.empty())
+  {
+    throw std::logic_error("a way without views");
+  }
+}
+
+void RouteGuide::see(const HomingReport& report, const PlanarPose& base)
+{
+  found_ = report.state == HomingState::APPROACHING || report.state == HomingState::NEAR ||
+           report.state == HomingState::DOCKING || report.state == HomingState::ARRIVED;
+  due_ = false;
+  if (!found_)
+  {
+    return;
+  }
+  blind_distance_ = blind_turn_ = 0.0;
+  if (!report.tracked)
+  {
+    return;
+  }
+  const bool in_place = report.displacement <= params_.handover_displacement || report.state == HomingState::ARRIVED;
+  if (report.goal_in_odom)
+  {
+    goal_ = report.goal_in_odom;
+  }
+  else if (in_place)
+  {
+    // The view's points are nearly in place, so the base is near, whatever the scale of the distance is.
+    const double distance = std::min(report.distance, params_.handover_distance);
+    goal_ =
+        compose(base, { distance * std::cos(report.heading), distance * std::sin(report.heading), report.yaw_error });
+  }
+  const bool near = report.goal_in_odom && report.distance <= params_.handover_distance &&
+                    std::abs(report.yaw_error) <= params_.handover_turn;
+  due_ = !last() && (near || in_place);
+}
+
+void RouteGuide::move(const PlanarPose& base)
+{
+  if (base_ && !found_)
+  {
+    const PlanarPose moved = compose(inverse(*base_), base);
+    blind_distance_ += moved.distance();
+    blind_turn_ += std::abs(moved.yaw);
+  }
+  base_ = base;
+}
+
+void RouteGuide::goOn()
+{
+  if (last())
+  {
+    throw std::logic_error("there is no next view");
+  }
+  if (goal_)
+  {
+    goal_ = compose(*goal_, relative(stops_[index_], stops_[index_ + 1]));
+  }
+  ++index_;
+  due_ = found_ = false;
+  blind_distance_ = blind_turn_ = 0.0;
+}
+
+std::optional<Course> RouteGuide::blindCourse() const
+{
+  if (found_ || !goal_ || blind_distance_ >= params_.blind_distance || blind_turn_ >= params_.blind_turn)
+  {
+    return std::nullopt;
+  }
+  Course course;
+  course.kind = Course::TO_VIEW;
+  course.view = *goal_;
+  course.max_speed = blind_speed_;
+  return course;
+}
+
+RouteGuide::Deviation RouteGuide::deviation(const PlanarPose& base) const
+{
+  if (!goal_ || index_ == 0)
+  {
+    return {};
+  }
+  const PlanarPose before = compose(*goal_, relative(stops_[index_], stops_[index_ - 1]));
+  const double x = goal_->x - before.x;
+  const double y = goal_->y - before.y;
+  const double length = std::hypot(x, y);
+  const double turn = wrapAngle(goal_->yaw - before.yaw);
+  Deviation deviation;
+  double part = 1.0;  // of the way from one stop to the other
+  if (length > 0.0)
+  {
+    deviation.sideways = (x * (base.y - before.y) - y * (base.x - before.x)) / length;
+    part = std::clamp((x * (base.x - before.x) + y * (base.y - before.y)) / (length * length), 0.0, 1.0);
+  }
+  deviation.yaw = wrapAngle(base.yaw - before.yaw - part * turn);
+  return deviation;
+}
+
+}  // namespace view_servo

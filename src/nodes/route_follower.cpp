@@ -1,0 +1,338 @@
+// Copyright (c) 2026, the view_servo authors
+// SPDX-License-Identifier: BSD-3-Clause
+#include "view_servo/FollowRouteAction.h"
+#include "view_servo/RecognizedViews.h"
+#include "view_servo/control/route_guide.h"
+#include "view_servo/ros/driver_node.h"
+#include "view_servo/ros/image_source.h"
+#include "view_servo/ros/view_homing.h"
+#include "view_servo/ros/worker.h"
+#include "view_servo/views/route_store.h"
+
+#include <algorithm>
+#include <cmath>
+#include <memory>
+#include <mutex>
+#include <optional>
+#include <stdexcept>
+#include <string>
+#include <utility>
+#include <vector>
+
+namespace view_servo
+{
+/** A goal that is ready to begin. */
+struct RouteTask
+{
+  std::vector<RouteStop> stops;       ///< to drive to, in order
+  std::shared_ptr<HomingTask> first;  ///< homing to the first of them
+  CameraFrame frame;                  ///< whose calibration and frame the homing to all of them is made with
+};
+
+/**
+ * Drives a mobile base along a stored route. Private parameters: see RouteFollowerParams.
+ *
+ * Subscribes what ViewHoming does, of matchers that follow `~wanted_view`; and, while a goal without a start is prepared,
+ * `recognized` (view_servo/RecognizedViews), of view_recognizer, which says where to begin.
+ *
+ * Publishes, besides what every driver does (see DriverNode), what BaseOutput does.
+ * Action: `follow` (view_servo/FollowRoute).
+ *
+ * It homes to one view after another, and goes on when it is near enough to one that is not the last (see RouteGuide).
+ * What homing to the next view needs is read from disk by a thread of its own, while the base drives to the one before.
+ */
+class RouteDriver
+{
+public:
+  using Action = FollowRouteAction;
+  using Velocity = BaseVelocity;
+  using Limiter = BaseVelocityLimiter;
+  using Task = RouteTask;
+  using Params = RouteFollowerParams;
+  static constexpr const char* ACTION = "follow";
+
+  RouteDriver(DriverContext& context, const Params& params)
+    : context_(context),
+      params_(params),
+      routes_(viewsDir(params.views_dir)),
+      worker_("reading the next view of a route", [this](Order&& order) { load(order); }),
+      homing_(context, params_,
+              { {},
+                [this] { onOdometry(); },
+                [this] { onImageOutcome(); },
+                [this](const HomingOutcome& outcome) { storeStructure(homing_.store(), outcome); },
+                {} })
+  {
+  }
+
+  // -------------------------------------------------------------------------------------------------------- goals
+
+  std::unique_ptr<Task> prepare(const FollowRouteGoal& goal)
+  {
+    if (!(goal.timeout >= 0.0 && std::isfinite(goal.timeout)))
+    {
+      throw std::invalid_argument("timeout must be finite and not negative");
+    }
+    if (goal.route.empty())
+    {
+      throw std::invalid_argument("the goal names no route");
+    }
+    if (goal.reverse && params_.homing.approach.base == BaseKind::DIFFERENTIAL)
+    {
+      throw std::invalid_argument(
+          "a differential base cannot follow a route in reverse: record it in the other direction");
+    }
+    const Route route = routes_.load(goal.route);
+    auto task = std::make_unique<Task>();
+    task->stops = stopsBetween(route, goal.start, goal.goal, goal.reverse);
+    if (goal.start.empty())
+    {
+      beginWhereTheBaseIs(task->stops);
+    }
+    const std::string& view = task->stops.front().view;
+    const LearntView stored = loadLearntView(homing_.store(), view);
+    task->frame = homing_.waitForInputs(view);
+    task->first = homing_.makeTask(stored, task->frame, params_.homing);
+    homing_.waitForAnswer();
+    return task;
+  }
+
+  void begin(std::unique_ptr<Task> task)
+  {
+    frame_ = task->frame;
+    guide_.emplace(params_.guide, task->stops, params_.homing.blind_speed);
+    homing_.setTask(task->first);
+    homing_.restartWay();
+    orderNext();
+  }
+
+  void end()
+  {
+    guide_.reset();
+    next_.reset();
+    homing_.setTask(nullptr);
+    homing_.want("", "");
+  }
+
+  static std::string idleView()
+  {
+    return "";
+  }
+
+  // ------------------------------------------------------------------------------------------------------ control
+
+  Progress progress() const
+  {
+    Progress progress = toProgress(homing_.report());
+    const std::string where =
+        "view '" + guide_->view() + "', " + std::to_string(guide_->number()) + " of " + std::to_string(guide_->count());
+    if (progress.state == Progress::ARRIVED && !guide_->last())
+    {
+      return { Progress::ACQUIRING, where + ": waits for the next view to be read" };
+    }
+    const bool unknown = progress.state == Progress::ACQUIRING || progress.state == Progress::LOST;
+    if (unknown && blindCourse())
+    {
+      return { Progress::DRIVING, where + ": goes on by odometry until the view is found" };
+    }
+    progress.reason = where + ": " + progress.reason;
+    return progress;
+  }
+
+  Velocity wanted(double /*time*/) const
+  {
+    const std::optional<Course> blind = blindCourse();
+    return blind ? homing_.follow(*blind) : homing_.wanted();
+  }
+  void sent(double time, const Velocity& velocity)
+  {
+    homing_.sent(time, velocity);
+  }
+  static void onMissingInput(double /*time*/, const std::string& /*why*/)
+  {
+  }
+  bool hasListener() const
+  {
+    return homing_.hasListener();
+  }
+  void publish(const Velocity& velocity) const
+  {
+    homing_.publish(velocity);
+  }
+  std::optional<double> takeLatency()
+  {
+    return homing_.takeLatency();
+  }
+
+  // ----------------------------------------------------------------------------------------------------- messages
+
+  void fill(ServoStatus& status) const
+  {
+    homing_.fill(status);
+  }
+
+  void fill(FollowRouteResult& result) const
+  {
+    result.travelled = guide_ ? homing_.travelled() : 0.0;
+  }
+
+  void fill(FollowRouteFeedback& feedback, const ServoStatus& /*status*/) const
+  {
+    feedback.view = guide_->view();
+    feedback.share = homing_.report().confidence;
+    const RouteGuide::Deviation deviation =
+        homing_.base() ? guide_->deviation(*homing_.base()) : RouteGuide::Deviation();
+    feedback.sideways = deviation.sideways;
+    feedback.yaw = deviation.yaw;
+  }
+
+  void diagnose(diagnostic_updater::DiagnosticStatusWrapper& status) const
+  {
+    homing_.diagnose(status);
+  }
+
+private:
+  /** What the loader has to read. */
+  struct Order
+  {
+    std::string goal;  ///< id of the goal that it is for
+    std::string view;
+    CameraFrame frame;
+  };
+
+  /**
+   * Drops the stops before the one that a recognizer sees. Nothing happens when there is no recognizer, or it sees none of
+   * them within a few seconds. By a topic, as drivers call no services. Waits, without the mutex.
+   */
+  void beginWhereTheBaseIs(std::vector<RouteStop>& stops) const
+  {
+    constexpr double PRESENCE = 0.5;  // until a recognizer is known to be there [s]
+    constexpr double PATIENCE = 4.0;  // with its answer [s]
+    struct Answer
+    {
+      std::mutex mutex;
+      std::string view;
+    };
+    const auto answer = std::make_shared<Answer>();
+    const ros::Time now = ros::Time::now();
+    const auto is_at = [](const std::string& view) {
+      return [view](const RouteStop& stop) {
+        return stop.view == view;
+      };
+    };
+    const boost::function<void(const RecognizedViews::ConstPtr&)> take = [=](const RecognizedViews::ConstPtr& message) {
+      for (const RecognizedView& seen : message->views)
+      {
+        const bool usable = message->header.stamp >= now && seen.verified != 0;
+        if (usable && std::any_of(stops.begin(), stops.end(), is_at(seen.view)))
+        {
+          const std::lock_guard<std::mutex> lock(answer->mutex);
+          answer->view = answer->view.empty() ? seen.view : answer->view;
+          return;
+        }
+      }
+    };
+    ros::NodeHandle nh = context_.nodeHandle();
+    const ros::Subscriber subscriber = nh.subscribe<RecognizedViews>("recognized", 1, take);
+    waitUntilReady(PRESENCE, [&] { return subscriber.getNumPublishers() > 0 ? "" : "a recognizer"; });
+    if (subscriber.getNumPublishers() == 0)
+    {
+      return;
+    }
+    const auto seen = [&] {
+      const std::lock_guard<std::mutex> lock(answer->mutex);
+      return answer->view;
+    };
+    waitUntilReady(PATIENCE,
+                   [&] { return seen().empty() ? "a recognizer's answer on '" + subscriber.getTopic() + "'" : ""; });
+    if (const std::string view = seen(); !view.empty())
+    {
+      ROS_INFO_STREAM("the route begins at view '" << view << "', which the recognizer sees");
+      stops.erase(stops.begin(), std::find_if(stops.begin(), stops.end(), is_at(view)));
+    }
+  }
+
+  /** A base that cannot slide stands until the next view is found: what it would have to do is not known without one. */
+  std::optional<Course> blindCourse() const
+  {
+    return guide_ && params_.homing.approach.base == BaseKind::HOLONOMIC ? guide_->blindCourse() : std::nullopt;
+  }
+
+  void orderNext()
+  {
+    next_.reset();
+    if (!guide_->last())
+    {
+      worker_.put([this](Order& order) { order = { context_.goalId(), guide_->next(), frame_ }; });
+    }
+  }
+
+  /** By the loader's thread. */
+  void load(const Order& order)
+  {
+    std::shared_ptr<HomingTask> task;
+    const std::string fault = guarded("reading view '" + order.view + "'", [&] {
+      task = homing_.makeTask(loadLearntView(homing_.store(), order.view), order.frame, params_.homing);
+    });
+    context_.locked([&] {
+      if (!guide_ || context_.goalId() != order.goal || guide_->next() != order.view)
+      {
+        return;
+      }
+      if (fault.empty())
+      {
+        next_ = task;
+      }
+      else
+      {
+        context_.abort("the route cannot go on: " + fault);
+      }
+    });
+  }
+
+  void onOdometry()
+  {
+    if (guide_)
+    {
+      guide_->move(*homing_.base());
+      homing_.setDoesWithoutMatches(blindCourse().has_value());
+    }
+  }
+
+  void onImageOutcome()
+  {
+    if (!guide_ || !context_.goalRuns() || !homing_.base())
+    {
+      return;
+    }
+    guide_->see(homing_.report(), *homing_.base());
+    if (guide_->due() && next_)
+    {
+      guide_->goOn();
+      ROS_INFO_STREAM("the route goes on to view '" << guide_->view() << "', " << guide_->number() << " of "
+                                                    << guide_->count());
+      homing_.setTask(std::exchange(next_, nullptr));
+      homing_.want(guide_->view(), context_.goalId());
+      context_.requestNextView(guide_->view());
+      orderNext();
+    }
+    homing_.setDoesWithoutMatches(blindCourse().has_value());
+  }
+
+  DriverContext& context_;
+  const Params params_;
+  const RouteStore routes_;
+  std::optional<RouteGuide> guide_;   // while a goal runs
+  std::shared_ptr<HomingTask> next_;  // to the view after this one, once it is read
+  CameraFrame frame_;
+  // Their threads use what is above, and each other only while a goal runs.
+  Worker<Order> worker_;
+  ViewHoming homing_;
+};
+
+}  // namespace view_servo
+
+int main(int argc, char** argv)
+{
+  return view_servo::runControlNode<view_servo::DriverNode<view_servo::RouteDriver>>(argc, argv, "route_follower");
+}

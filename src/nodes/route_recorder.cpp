@@ -1,0 +1,422 @@
+// Copyright (c) 2026, the view_servo authors
+// SPDX-License-Identifier: BSD-3-Clause
+#include "view_servo/StartRoute.h"
+#include "view_servo/control/odometry_history.h"
+#include "view_servo/parameters/error_text.h"
+#include "view_servo/ros/camera_input.h"
+#include "view_servo/ros/conversions.h"
+#include "view_servo/ros/driver_context.h"
+#include "view_servo/ros/image_source.h"
+#include "view_servo/ros/node_base.h"
+#include "view_servo/ros/node_params.h"
+#include "view_servo/ros/odometry_input.h"
+#include "view_servo/ros/readiness.h"
+#include "view_servo/ros/transform_source.h"
+#include "view_servo/ros/worker.h"
+#include "view_servo/tracking/pair_structure.h"
+#include "view_servo/tracking/route_spacing.h"
+#include "view_servo/views/route_store.h"
+
+#include <nav_msgs/Odometry.h>
+#include <std_srvs/Trigger.h>
+
+#include <cmath>
+#include <cstdio>
+#include <functional>
+#include <memory>
+#include <mutex>
+#include <optional>
+#include <stdexcept>
+#include <string>
+#include <utility>
+#include <vector>
+
+namespace view_servo
+{
+/**
+ * Records a route while somebody drives the base: stores a view at the start, whenever the last one is left behind (see
+ * RouteSpacing), and at the end. Private parameters: see RouteRecorderParams.
+ *
+ * Subscribes `image_raw`, `camera_info` (see CameraInput), `odom` (nav_msgs/Odometry), of `~base_frame`, and tf.
+ * Services: `~start` (view_servo/StartRoute); `~stop` (std_srvs/Trigger): stores the route. When that cannot be, the answer
+ * says why, and the views that belong to it are removed. Publishes `/diagnostics`.
+ */
+class RouteRecorderNode : private NodeBase
+{
+public:
+  RouteRecorderNode(const ros::NodeHandle& nh, const ros::NodeHandle& private_nh)
+    : NodeBase(nh, private_nh),
+      params_(readParams<RouteRecorderParams>(private_nh)),
+      base_frame_(withoutSlash(params_.base_frame)),
+      routes_(viewsDir(params_.views_dir)),
+      odometry_input_("odometry", "'" + nh_.resolveName("odom") + "'", LONGEST_GAP),
+      odometry_(odometry_input_, transforms_, base_frame_, params_.odometry_delay),
+      history_(HISTORY),
+      worker_("a view of a route", [this](Place&& place) { work(place); }),
+      camera_(nh, params_.camera, [this](const CameraFrame& frame) { onFrame(frame); })
+  {
+    odometry_subscriber_ =
+        subscribe<nav_msgs::Odometry>("odom", 10, [this](const nav_msgs::Odometry::ConstPtr& m) { onOdometry(*m); });
+    diagnostics_.add("camera", &camera_, &CameraInput::diagnose);
+    diagnostics_.add("recording", this, &RouteRecorderNode::diagnose);
+    start_service_ = serve("start", &RouteRecorderNode::start, this);
+    stop_service_ = serve("stop", &RouteRecorderNode::stop, this);
+    ROS_INFO_STREAM("routes are in " << routes_.directory());
+  }
+
+  ~RouteRecorderNode()
+  {
+    const std::lock_guard<std::mutex> lock(recording_mutex_);
+    if (recording_)
+    {
+      ROS_WARN_STREAM("route '" << recording_->route.name << "' is not stored: the node ends before ~stop");
+      discard();
+    }
+  }
+
+private:
+  static constexpr double HISTORY = 5.0;      // of odometry [s]
+  static constexpr double LONGEST_GAP = 0.5;  // without odometry [s]
+
+  /** An image, and where the base was. */
+  struct Place
+  {
+    CameraFrame frame;
+    PlanarPose base;  ///< in odometry's frame
+  };
+
+  struct Recording
+  {
+    Route route;
+    StoredView before;                      ///< the view before the last
+    StoredView last;                        ///< the last view
+    CameraMount mount;                      ///< where the camera is on the base
+    std::unique_ptr<RouteSpacing> spacing;  ///< from the last view on
+    std::string fault;                      ///< why the route cannot be stored any more; empty: it can
+  };
+
+  // ------------------------------------------------------------------------------------------------------- inputs
+
+  void onOdometry(const nav_msgs::Odometry& message)
+  {
+    const std::lock_guard<std::mutex> lock(input_mutex_);
+    const std::optional<OdometryReading> reading = odometry_.read(message, odometry_subscriber_.getNumPublishers());
+    if (!odometry_input_.jump().empty())
+    {
+      jump_ = odometry_input_.jump();
+      history_ = OdometryHistory(HISTORY);
+      newest_.reset();
+    }
+    if (reading)
+    {
+      history_.add(reading->time, reading->pose);
+    }
+  }
+
+  void onFrame(const CameraFrame& frame)
+  {
+    const std::lock_guard<std::mutex> lock(input_mutex_);
+    const std::optional<PlanarPose> base = history_.at(frame.image->header.stamp.toSec());
+    if (base && odometry_input_.fresh())
+    {
+      newest_ = Place{ frame, *base };
+      worker_.put([&](Place& place) { place = *newest_; });
+    }
+  }
+
+  /** Waits for an image that is taken from now on, with odometry. @throws std::runtime_error saying what does not come. */
+  Place waitForPlace()
+  {
+    const ros::Time now = ros::Time::now();
+    Place place;
+    const std::string missing = waitUntilReady(params_.patience, [&]() -> std::string {
+      CameraFrame frame;
+      const std::string camera = camera_.missing(frame);
+      const std::lock_guard<std::mutex> lock(input_mutex_);
+      if (newest_ && newest_->frame.image->header.stamp > now)
+      {
+        place = *newest_;
+        return "";
+      }
+      if (!camera.empty() || odometry_input_.fresh())
+      {
+        return camera.empty() ? "no new image has come on '" + camera_.imageTopic() + "'" : camera;
+      }
+      return odometry_input_.problem().empty() ? "no odometry comes on " + odometry_input_.topics()
+                                               : odometry_input_.problem();
+    });
+    if (!missing.empty())
+    {
+      throw std::runtime_error(missing);
+    }
+    return place;
+  }
+
+  // ----------------------------------------------------------------------------------------------------- recording
+
+  void start(const StartRoute::Request& request, StartRoute::Response& response)
+  {
+    const std::lock_guard<std::mutex> lock(recording_mutex_);
+    const std::string name = request.name;
+    const auto refuse = [&](const std::string& reason) {
+      throw std::runtime_error("route '" + name.substr(0, LONGEST_NAME) + "' is not recorded: " + reason);
+    };
+    if (recording_)
+    {
+      refuse("route '" + recording_->route.name + "' is, call ~stop first");
+    }
+    if (!isValidRouteName(name))
+    {
+      refuse("a route's name is 1 to 58 letters, digits, '_' and '-', and starts with a letter or digit");
+    }
+    if (routes_.has(name))
+    {
+      refuse("there is one of that name: delete or rename that first");
+    }
+    const auto views = routes_.views().revisions();
+    if (views.count(viewNameOf(name, 1)) > 0)
+    {
+      refuse("there is a view '" + viewNameOf(name, 1) + "' already: delete it, or take another name");
+    }
+    Recording recording;
+    recording.route.name = name;
+    try
+    {
+      const Place place = waitForPlace();
+      {
+        const std::lock_guard<std::mutex> input_lock(input_mutex_);
+        jump_.clear();
+        recording.route.frame = odometry_.frame();
+      }
+      recording_ = std::move(recording);
+      add(place);
+    }
+    catch (const std::exception& error)
+    {
+      recording_ ? discard() : static_cast<void>(0);
+      refuse(oneLine(error));
+    }
+    response.success = true;
+    response.message = "route '" + name + "' is recorded from view '" + viewNameOf(name, 1) + "' on, until ~stop";
+    ROS_INFO_STREAM(response.message);
+  }
+
+  void stop(const std_srvs::Trigger::Request& /*request*/, std_srvs::Trigger::Response& response)
+  {
+    constexpr double SAME_PLACE = 0.01;  // [m, rad]
+    const std::lock_guard<std::mutex> lock(recording_mutex_);
+    if (!recording_)
+    {
+      throw std::runtime_error("no route is recorded: call ~start first");
+    }
+    Route& route = recording_->route;
+    const std::string name = route.name;
+    try
+    {
+      checkGoesOn();
+      const Place place = waitForPlace();
+      const PlanarPose moved = compose(inverse(route.stops.back().base), place.base);
+      if (moved.distance() > SAME_PLACE || std::abs(moved.yaw) > SAME_PLACE)
+      {
+        addChecked(place);
+      }
+      checkGoesOn();
+      learnLast();
+      if (route.stops.size() < 2)
+      {
+        throw std::runtime_error("the base has not moved");
+      }
+      routes_.save(route);
+    }
+    catch (const std::exception& error)
+    {
+      discard();
+      throw std::runtime_error("route '" + name + "' is not stored, and its views are removed: " + oneLine(error));
+    }
+    char text[160];
+    std::snprintf(text, sizeof(text), "', %zu views over %.2f m", route.stops.size(), lengthOf(route));
+    response.message = "stored route '" + name + text;
+    response.success = 1;
+    recording_.reset();
+    ROS_INFO_STREAM(response.message);
+  }
+
+  /** @throws std::runtime_error saying why the route cannot be stored any more. */
+  void checkGoesOn()
+  {
+    {
+      const std::lock_guard<std::mutex> lock(input_mutex_);
+      recording_->fault = recording_->fault.empty() ? jump_ : recording_->fault;
+    }
+    if (!recording_->fault.empty())
+    {
+      throw std::runtime_error(recording_->fault);
+    }
+  }
+
+  /** By the worker's thread, with each image that it has time for. */
+  void work(const Place& place)
+  {
+    const std::lock_guard<std::mutex> lock(recording_mutex_);
+    if (!recording_ || !recording_->fault.empty())
+    {
+      return;
+    }
+    const RouteStop& last = recording_->route.stops.back();
+    const bool newer = place.frame.image->header.stamp.toSec() > last.stamp;
+    if (newer && recording_->spacing->due(compose(inverse(last.base), place.base)))
+    {
+      try
+      {
+        checkGoesOn();
+        addChecked(place);
+      }
+      catch (const std::exception& error)
+      {
+        recording_->fault = oneLine(error);
+        ROS_ERROR_STREAM("route '" << recording_->route.name << "' cannot be stored: " << recording_->fault);
+      }
+    }
+  }
+
+  /** As add(), if the base has not gone too far since the last view. */
+  void addChecked(const Place& place)
+  {
+    constexpr double MOST = 2.0;  // times the usual distance and turn
+    const RouteStop& last = recording_->route.stops.back();
+    const PlanarPose moved = compose(inverse(last.base), place.base);
+    if (moved.distance() > MOST * params_.spacing.distance || std::abs(moved.yaw) > MOST * params_.spacing.turn)
+    {
+      char text[160];
+      std::snprintf(text, sizeof(text),
+                    "the base has gone %.2f m and turned %.0f degrees without a usable image since view '",
+                    moved.distance(), std::abs(moved.yaw) * 180.0 / M_PI);
+      throw std::runtime_error(text + last.view + "': drive slower");
+    }
+    add(place);
+  }
+
+  /** Stores a view, and adds it to the route. @throws std::runtime_error saying why it cannot be. */
+  void add(const Place& place)
+  {
+    Route& route = recording_->route;
+    if (route.stops.size() >= MAX_ROUTE_STOPS)
+    {
+      throw std::runtime_error("it has " + std::to_string(MAX_ROUTE_STOPS) + " views already");
+    }
+    const std_msgs::Header& header = place.frame.image->header;
+    const geometry_msgs::TransformStamped mount =
+        transforms_.lookUp(base_frame_, header.frame_id, ros::Time(0), params_.patience);
+    StoredView view;
+    view.name = viewNameOf(route.name, route.stops.size() + 1);
+    view.image = toGrey(*place.frame.image);
+    view.camera = toCamera(*place.frame.info);
+    view.stamp = header.stamp.toSec();
+    view.frame_id = header.frame_id;
+    recording_->mount = CameraMount(toIsometry(mount.transform));
+    auto spacing = std::make_unique<RouteSpacing>(params_.spacing, view.image, *view.camera, recording_->mount);
+    if (const std::string warning = routes_.views().save(view, false); !warning.empty())
+    {
+      ROS_WARN_STREAM(warning);
+    }
+    route.stops.push_back({ view.name, place.base, view.stamp });
+    recording_->spacing = std::move(spacing);
+    ROS_INFO_STREAM("stored view '" << view.name << "'");
+    if (route.stops.size() > 1)
+    {
+      const PlanarPose moved = compose(inverse(route.stops[route.stops.size() - 2].base), place.base);
+      learn(recording_->last, view, moved);
+      recording_->before = std::move(recording_->last);
+    }
+    recording_->last = std::move(view);
+  }
+
+  /** Of the last view, from the one before. */
+  void learnLast()
+  {
+    const std::vector<RouteStop>& stops = recording_->route.stops;
+    if (stops.size() > 1)
+    {
+      learn(recording_->last, recording_->before, compose(inverse(stops.back().base), stops[stops.size() - 2].base));
+    }
+  }
+
+  /**
+   * Stores where the things are that a view shows, so that a follower knows it from the start; that this fails is no fault of the
+   * route. @param moved pose of the base at the other view in the base at this one.
+   */
+  void learn(const StoredView& view, const StoredView& other, const PlanarPose& moved) const
+  {
+    guarded("learning view '" + view.name + "'", [&] {
+      const bool same_camera = view.camera->k == other.camera->k && view.image.size() == other.image.size();
+      const ViewStructure structure =
+          same_camera ? structureOfPair(view.image, other.image, *view.camera, recording_->mount, moved)
+                      : ViewStructure();
+      if (!structure.points.empty())
+      {
+        routes_.views().saveStructure(view.name, routes_.views().revision(view.name), structure);
+      }
+      ROS_INFO_STREAM("view '" << view.name << "': the depths of " << structure.points.size() << " points are stored");
+    });
+  }
+
+  /** Ends the recording, and removes its views. */
+  void discard()
+  {
+    for (const RouteStop& stop : recording_->route.stops)
+    {
+      guarded("removing view '" + stop.view + "'", [&] { routes_.views().remove(stop.view); });
+    }
+    recording_.reset();
+  }
+
+  void diagnose(diagnostic_updater::DiagnosticStatusWrapper& status)
+  {
+    const std::unique_lock<std::mutex> lock(recording_mutex_, std::try_to_lock);
+    if (!lock)
+    {
+      status.summary(diagnostic_msgs::DiagnosticStatus::OK, "storing a view");
+    }
+    else if (!recording_)
+    {
+      status.summary(diagnostic_msgs::DiagnosticStatus::OK, "no route is recorded");
+    }
+    else
+    {
+      const bool good = recording_->fault.empty();
+      status.summary(good ? diagnostic_msgs::DiagnosticStatus::OK : diagnostic_msgs::DiagnosticStatus::ERROR,
+                     good ? "records route '" + recording_->route.name + "'" : recording_->fault);
+      status.add("Views", recording_->route.stops.size());
+    }
+  }
+
+  static constexpr std::size_t LONGEST_NAME = 64;  // that is told of
+
+  const RouteRecorderParams params_;
+  const std::string base_frame_;
+  const RouteStore routes_;
+  const TransformSource transforms_;
+
+  std::mutex input_mutex_;  // guards what follows; taken after the other one
+  DriverInput odometry_input_;
+  OdometryReader odometry_;
+  OdometryHistory history_;
+  std::optional<Place> newest_;
+  std::string jump_;  // says so when time has gone back since ~start
+
+  std::mutex recording_mutex_;  // guards what follows; may be held while a view is stored
+  std::optional<Recording> recording_;
+
+  Worker<Place> worker_;
+  CameraInput camera_;
+  ros::Subscriber odometry_subscriber_;
+  ros::ServiceServer start_service_;
+  ros::ServiceServer stop_service_;
+};
+
+}  // namespace view_servo
+
+int main(int argc, char** argv)
+{
+  return view_servo::runNode<view_servo::RouteRecorderNode>(argc, argv, "route_recorder");
+}

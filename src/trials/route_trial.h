@@ -1,0 +1,57 @@
+// Copyright (c) 2026, the view_servo authors
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include "sim/world.h"
+#include "trials/homing_trial.h"
+#include "view_servo/control/homing.h"
+#include "view_servo/control/route_guide.h"
+#include "view_servo/control/velocity_limiter.h"
+#include "view_servo/geometry/planar_pose.h"
+#include "view_servo/tracking/route_spacing.h"
+
+#include <cstddef>
+#include <cstdint>
+#include <string>
+#include <vector>
+
+namespace view_servo::sim
+{
+struct RouteTrialParams
+{
+  HomingParams homing;
+  RouteGuideParams guide;
+  RouteSpacingParams spacing;
+  VelocityLimits limits;
+  /** While the route is recorded and followed; the light only while it is followed. Of them: noise, odometry, light. */
+  HomingConditions conditions;
+  double matching_period = 0.2;  ///< between two images that are matched by points [s], > 0
+  double matching_time = 0.15;   ///< from an image's stamp until homing gets its matches [s]
+  double max_duration = 300.0;   ///< after which a run is given up [s]
+  std::uint64_t seed = 1;        ///< of the noise of images and odometry
+};
+
+struct RouteOutcome
+{
+  bool arrived = false;
+  std::string reason;           ///< why it ended
+  std::size_t views = 0;        ///< of the route
+  std::size_t reached = 0;      ///< number of the view that was driven to last, from 1
+  double length = 0.0;          ///< true one, of the recorded way [m]
+  double sideways_rms = 0.0;    ///< true distances from the recorded way, from the first view that was left on [m]
+  double sideways_max = 0.0;    ///< the largest of them [m]
+  double distance_error = 0.0;  ///< true distance from the last view's place at the end [m]
+  double yaw_error = 0.0;       ///< true one, at the end [rad]
+  double duration = 0.0;        ///< [s]
+};
+
+/**
+ * Records a route in a simulated world, driving straight from one waypoint to the next, and follows it, in one process and
+ * with the classes and delays of the nodes.
+ * @param waypoints poses of the base in the world, at least two. @param start where it is put to follow the route.
+ * @throws std::invalid_argument naming faults of the parameters, or what stands in the way.
+ */
+RouteOutcome runRoute(const World& world, const RouteTrialParams& params, const std::vector<PlanarPose>& waypoints,
+                      const PlanarPose& start);
+
+}  // namespace view_servo::sim

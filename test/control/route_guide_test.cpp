@@ -1,0 +1,177 @@
+// Copyright (c) 2026, the view_servo authors
+// SPDX-License-Identifier: BSD-3-Clause
+#include "view_servo/control/route_guide.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <stdexcept>
+
+namespace view_servo
+{
+namespace
+{
+/** Three stops, half a metre apart, the last one turned; recorded in a frame that is elsewhere than odometry's. */
+Route makeRoute()
+{
+  const PlanarPose frame{ 3.0, -2.0, 1.0 };
+  Route route;
+  route.name = "hall";
+  route.stops = { { "a", compose(frame, { 0.0, 0.0, 0.0 }), 0.0 },
+                  { "b", compose(frame, { 0.5, 0.0, 0.0 }), 0.0 },
+                  { "c", compose(frame, { 1.0, 0.1, 0.2 }), 0.0 } };
+  return route;
+}
+
+/** What homing knows when the points of a view are tracked. */
+HomingReport trackedReport(const PlanarPose& base, const PlanarPose& goal, bool metric)
+{
+  const PlanarPose left = compose(inverse(base), goal);
+  HomingReport report;
+  report.state = HomingState::APPROACHING;
+  report.tracked = true;
+  report.distance = left.distance();
+  report.heading = left.heading();
+  report.yaw_error = left.yaw;
+  if (metric)
+  {
+    report.goal_in_odom = goal;
+  }
+  return report;
+}
+
+std::string errorOf(const std::string& start, const std::string& goal, bool reverse)
+{
+  try
+  {
+    stopsBetween(makeRoute(), start, goal, reverse);
+  }
+  catch (const std::invalid_argument& error)
+  {
+    return error.what();
+  }
+  return "no error";
+}
+
+TEST(StopsBetween, AreThoseOnTheWay)
+{
+  const auto names = [](const std::string& start, const std::string& goal, bool reverse) {
+    std::string text;
+    for (const RouteStop& stop : stopsBetween(makeRoute(), start, goal, reverse))
+    {
+      text += stop.view;
+    }
+    return text;
+  };
+  EXPECT_EQ(names("", "", false), "abc");
+  EXPECT_EQ(names("b", "", false), "bc");
+  EXPECT_EQ(names("", "b", false), "ab");
+  EXPECT_EQ(names("b", "b", false), "b");
+  EXPECT_EQ(names("", "", true), "cba");
+  EXPECT_EQ(names("b", "", true), "ba");
+  EXPECT_EQ(errorOf("x", "", false), "view 'x' is not on route 'hall'");
+  EXPECT_EQ(errorOf("", "x", true), "view 'x' is not on route 'hall'");
+  EXPECT_NE(errorOf("c", "a", false).find("comes before view 'c' on route 'hall'; reverse: true"), std::string::npos);
+  EXPECT_NE(errorOf("a", "c", true).find("in reverse"), std::string::npos);
+}
+
+TEST(RouteGuide, GoesOnNearAViewThatIsNotTheLast)
+{
+  RouteGuide guide(RouteGuideParams(), makeRoute().stops, 0.1);
+  const PlanarPose at_a{ 10.0, 5.0, 0.5 };
+  EXPECT_EQ(guide.view(), "a");
+  EXPECT_EQ(guide.next(), "b");
+  EXPECT_FALSE(guide.blindCourse()) << "nothing is known yet";
+  const PlanarPose far = compose(at_a, { -0.6, 0.0, 0.0 });
+  guide.see(trackedReport(far, at_a, true), far);
+  EXPECT_FALSE(guide.due());
+  const PlanarPose near = compose(at_a, { -0.29, 0.0, 0.0 });
+  guide.see(trackedReport(near, at_a, false), near);
+  EXPECT_FALSE(guide.due()) << "how far it is in metres is not known";
+  const PlanarPose turned = compose(at_a, { -0.1, 0.0, 0.2 });
+  guide.see(trackedReport(turned, at_a, true), turned);
+  EXPECT_FALSE(guide.due());
+  guide.see(trackedReport(near, at_a, true), near);
+  ASSERT_TRUE(guide.due());
+  guide.goOn();
+  EXPECT_EQ(guide.view(), "b");
+  EXPECT_FALSE(guide.due());
+
+  const PlanarPose at_b = compose(at_a, { 0.5, 0.0, 0.0 });
+  guide.see(trackedReport(at_b, at_b, true), at_b);
+  ASSERT_TRUE(guide.due());
+  guide.goOn();
+  const PlanarPose at_c = compose(at_a, { 1.0, 0.1, 0.2 });
+  guide.see(trackedReport(at_c, at_c, true), at_c);
+  EXPECT_FALSE(guide.due()) << "the last view is homed to";
+  EXPECT_TRUE(guide.last());
+  EXPECT_THROW(guide.goOn(), std::logic_error);
+}
+
+TEST(RouteGuide, GoesOnWhereThePointsAreInPlace)
+{
+  RouteGuide guide(RouteGuideParams(), makeRoute().stops, 0.1);
+  const PlanarPose base{ 1.0, 1.0, 0.0 };
+  HomingReport report = trackedReport(base, compose(base, { 2.0, 0.0, 0.0 }), false);  // by a wrong scale
+  report.state = HomingState::DOCKING;
+  report.displacement = 20.0;
+  guide.see(report, base);
+  EXPECT_FALSE(guide.due());
+  report.displacement = 4.0;
+  guide.see(report, base);
+  ASSERT_TRUE(guide.due());
+  guide.goOn();
+  const std::optional<Course> course = guide.blindCourse();
+  ASSERT_TRUE(course);
+  EXPECT_NEAR(course->view.x, 1.0 + 0.3 + 0.5, 1e-12);
+}
+
+TEST(RouteGuide, LeadsByOdometryWithinBounds)
+{
+  RouteGuideParams params;
+  params.blind_distance = 0.2;
+  params.blind_turn = 0.3;
+  for (const PlanarPose& step : { PlanarPose{ 0.15, 0.0, 0.0 }, PlanarPose{ 0.0, 0.0, -0.2 } })
+  {
+    RouteGuide guide(params, makeRoute().stops, 0.1);
+    const PlanarPose at_a{ 10.0, 5.0, 0.5 };
+    guide.move(at_a);
+    guide.see(trackedReport(at_a, at_a, true), at_a);
+    EXPECT_FALSE(guide.blindCourse()) << "homing knows the way";
+    guide.goOn();
+    const std::optional<Course> course = guide.blindCourse();
+    ASSERT_TRUE(course);
+    const PlanarPose expected = compose(at_a, { 0.5, 0.0, 0.0 });
+    EXPECT_NEAR(course->view.x, expected.x, 1e-12);
+    EXPECT_NEAR(course->view.y, expected.y, 1e-12);
+    EXPECT_NEAR(course->view.yaw, expected.yaw, 1e-12);
+    EXPECT_EQ(course->max_speed, 0.1);
+    const PlanarPose once = compose(at_a, step);
+    guide.move(once);
+    EXPECT_TRUE(guide.blindCourse());
+    guide.see(HomingReport(), once);  // not found yet
+    EXPECT_TRUE(guide.blindCourse());
+    guide.move(compose(once, step));
+    EXPECT_FALSE(guide.blindCourse()) << "far enough";
+  }
+}
+
+TEST(RouteGuide, SaysHowTheBaseIsPlacedOnTheLine)
+{
+  RouteGuide guide(RouteGuideParams(), makeRoute().stops, 0.1);
+  const PlanarPose at_a{ 10.0, 5.0, 0.5 };
+  guide.see(trackedReport(at_a, at_a, true), at_a);
+  EXPECT_TRUE(std::isnan(guide.deviation(at_a).sideways)) << "no line leads to the first view";
+  guide.goOn();
+  const RouteGuide::Deviation deviation = guide.deviation(compose(at_a, { 0.2, 0.07, -0.03 }));
+  EXPECT_NEAR(deviation.sideways, 0.07, 1e-12);
+  EXPECT_NEAR(deviation.yaw, -0.03, 1e-12);
+  guide.see(trackedReport(at_a, compose(at_a, { 0.5, 0.0, 0.0 }), true), at_a);
+  guide.goOn();
+  const PlanarPose half = compose(at_a, { 0.75, 0.05, 0.1 });
+  EXPECT_NEAR(guide.deviation(half).sideways, 0.0, 1e-12);
+  EXPECT_NEAR(guide.deviation(half).yaw, 0.0, 1e-12);
+}
+
+}  // namespace
+}  // namespace view_servo
