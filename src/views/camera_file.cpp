@@ -3,14 +3,11 @@
 #include "view_servo/views/camera_file.h"
 
 #include "camera_yaml.h"
+#include "small_yaml_file.h"
 #include "view_servo/parameters/error_text.h"
 
-#include <cstdint>
 #include <exception>
-#include <filesystem>
-#include <fstream>
 #include <stdexcept>
-#include <system_error>
 #include <vector>
 
 namespace view_servo
@@ -61,20 +58,9 @@ Camera anyCameraFromYaml(const YAML::Node& node)
 
 Camera readCameraFile(const std::string& path)
 {
-  constexpr std::uintmax_t LARGEST = 1000000;  // [bytes]
   try
   {
-    std::error_code error;
-    if (!std::filesystem::is_regular_file(path, error))
-    {
-      throw std::runtime_error("there is no such file");
-    }
-    if (std::filesystem::file_size(path) > LARGEST)
-    {
-      throw std::runtime_error("it is no calibration, being larger than 1 MB");
-    }
-    std::ifstream file(path);
-    Camera camera = anyCameraFromYaml(YAML::Load(file));
+    Camera camera = anyCameraFromYaml(loadSmallYamlFile(path, "no calibration"));
     const std::string fault = camera.fault();
     if (!fault.empty())
     {

@@ -2,20 +2,18 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "view_servo/views/hand_eye_file.h"
 
+#include "small_yaml_file.h"
 #include "view_servo/parameters/error_text.h"
 
 #include <yaml-cpp/yaml.h>
 
 #include <cmath>
-#include <cstdint>
 #include <cstdio>
 #include <exception>
-#include <filesystem>
 #include <fstream>
 #include <iomanip>
 #include <sstream>
 #include <stdexcept>
-#include <system_error>
 
 namespace view_servo
 {
@@ -85,20 +83,9 @@ HandEyeFile fromYaml(const YAML::Node& root)
 
 HandEyeFile readHandEyeFile(const std::string& path)
 {
-  constexpr std::uintmax_t LARGEST = 1000000;  // [bytes]
   try
   {
-    std::error_code error;
-    if (!std::filesystem::is_regular_file(path, error))
-    {
-      throw std::runtime_error("there is no such file");
-    }
-    if (std::filesystem::file_size(path) > LARGEST)
-    {
-      throw std::runtime_error("it is none, being larger than 1 MB");
-    }
-    std::ifstream file(path);
-    return fromYaml(YAML::Load(file));
+    return fromYaml(loadSmallYamlFile(path, "none"));
   }
   catch (const std::exception& error)
   {
