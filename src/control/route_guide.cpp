@@ -27,8 +27,7 @@ std::vector<Parameter> parameters(RouteGuideParams& params)
     real("handover_turn", params.handover_turn, "rad", "> 0", "largest yaw error at that"),
     real("handover_displacement", params.handover_displacement, "px", "> 0",
          "it goes on, too, where the view's points are so near to their places, in the median, as the distance may not "
-         "be "
-         "known in metres"),
+         "be known in metres"),
     real("blind_distance", params.blind_distance, "m", ">= 0",
          "how far a holonomic base goes on by odometry until the next view is found; then it stands and waits"),
     real("blind_turn", params.blind_turn, "rad", ">= 0", "how far it turns by odometry until then"),
