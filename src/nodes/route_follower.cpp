@@ -314,7 +314,7 @@ private:
       else
       {
         guide_->goTo(order.view);
-        driveTo(task, "goes on at");
+        driveTo(task);
       }
     });
   }
@@ -338,7 +338,7 @@ private:
     if (guide_->due() && next_)
     {
       guide_->goOn();
-      driveTo(std::exchange(next_, nullptr), "goes on to");
+      driveTo(std::exchange(next_, nullptr));
     }
     homing_.setDoesWithoutMatches(blindCourse().has_value());
     const HomingState state = homing_.report().state;
@@ -352,11 +352,11 @@ private:
     }
   }
 
-  /** From now on the guide's view is homed to. @param how for the log. */
-  void driveTo(std::shared_ptr<HomingTask> task, const char* how)
+  /** From now on the guide's view is homed to. */
+  void driveTo(std::shared_ptr<HomingTask> task)
   {
-    ROS_INFO_STREAM("the route " << how << " view '" << guide_->view() << "', " << guide_->number() << " of "
-                                 << guide_->count());
+    ROS_INFO_STREAM("the route goes on to view '" << guide_->view() << "', " << guide_->number() << " of "
+                                                  << guide_->count());
     homing_.setTask(std::move(task));
     homing_.want(guide_->view(), context_.goalId());
     context_.requestNextView(guide_->view());
