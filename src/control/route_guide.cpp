@@ -126,6 +126,20 @@ void RouteGuide::goOn()
   blind_distance_ = blind_turn_ = 0.0;
 }
 
+void RouteGuide::goTo(const std::string& view)
+{
+  const auto found =
+      std::find_if(stops_.begin(), stops_.end(), [&](const RouteStop& stop) { return stop.view == view; });
+  if (found == stops_.end())
+  {
+    throw std::logic_error("the view is not on the way");
+  }
+  index_ = static_cast<std::size_t>(found - stops_.begin());
+  goal_.reset();
+  due_ = found_ = false;
+  blind_distance_ = blind_turn_ = 0.0;
+}
+
 std::optional<Course> RouteGuide::blindCourse() const
 {
   if (found_ || !goal_ || blind_distance_ >= params_.blind_distance || blind_turn_ >= params_.blind_turn)

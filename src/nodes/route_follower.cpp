@@ -32,8 +32,9 @@ struct RouteTask
 /**
  * Drives a mobile base along a stored route. Private parameters: see RouteFollowerParams.
  *
- * Subscribes what ViewHoming does, of matchers that follow `~wanted_view`; and, while a goal without a start is prepared,
- * `recognized` (view_servo/RecognizedViews), of view_recognizer, which says where to begin.
+ * Subscribes what ViewHoming does, of matchers that follow `~wanted_view`; and, while a goal
+ * without a start is prepared or a view has not been found for a while, `recognized` (view_servo/RecognizedViews), of
+ * view_recognizer, which says where to go on.
  *
  * Publishes, besides what every driver does (see DriverNode), what BaseOutput does.
  * Action: `follow` (view_servo/FollowRoute).
@@ -60,7 +61,10 @@ public:
               { {},
                 [this] { onOdometry(); },
                 [this] { onImageOutcome(); },
-                [this](const HomingOutcome& outcome) { storeStructure(homing_.store(), outcome); },
+                [this](const HomingOutcome& outcome) {
+                  storeStructure(homing_.store(), outcome);
+                  listenToRecognizer();
+                },
                 {} })
   {
   }
@@ -100,7 +104,9 @@ public:
   void begin(std::unique_ptr<Task> task)
   {
     frame_ = task->frame;
-    guide_.emplace(params_.guide, task->stops, params_.homing.blind_speed);
+    stops_ = task->stops;
+    guide_.emplace(params_.guide, stops_, params_.homing.blind_speed);
+    lost_since_.reset();
     homing_.setTask(task->first);
     homing_.restartWay();
     orderNext();
@@ -110,6 +116,7 @@ public:
   {
     guide_.reset();
     next_.reset();
+    lost_since_.reset();
     homing_.setTask(nullptr);
     homing_.want("", "");
   }
@@ -200,6 +207,22 @@ private:
     CameraFrame frame;
   };
 
+  /** The first verified view of a recognizer's answer that is one of the stops; empty: none. */
+  static std::string seenOf(const std::vector<RouteStop>& stops, const RecognizedViews& message)
+  {
+    for (const RecognizedView& seen : message.views)
+    {
+      const auto is_there = [&](const RouteStop& stop) {
+        return stop.view == seen.view;
+      };
+      if (seen.verified != 0 && std::any_of(stops.begin(), stops.end(), is_there))
+      {
+        return seen.view;
+      }
+    }
+    return "";
+  }
+
   /**
    * Drops the stops before the one that a recognizer sees. Nothing happens when there is no recognizer, or it sees none of
    * them within a few seconds. By a topic, as drivers call no services. Waits, without the mutex.
@@ -215,22 +238,10 @@ private:
     };
     const auto answer = std::make_shared<Answer>();
     const ros::Time now = ros::Time::now();
-    const auto is_at = [](const std::string& view) {
-      return [view](const RouteStop& stop) {
-        return stop.view == view;
-      };
-    };
     const boost::function<void(const RecognizedViews::ConstPtr&)> take = [=](const RecognizedViews::ConstPtr& message) {
-      for (const RecognizedView& seen : message->views)
-      {
-        const bool usable = message->header.stamp >= now && seen.verified != 0;
-        if (usable && std::any_of(stops.begin(), stops.end(), is_at(seen.view)))
-        {
-          const std::lock_guard<std::mutex> lock(answer->mutex);
-          answer->view = answer->view.empty() ? seen.view : answer->view;
-          return;
-        }
-      }
+      const std::string view = message->header.stamp >= now ? seenOf(stops, *message) : "";
+      const std::lock_guard<std::mutex> lock(answer->mutex);
+      answer->view = answer->view.empty() ? view : answer->view;
     };
     ros::NodeHandle nh = context_.nodeHandle();
     const ros::Subscriber subscriber = nh.subscribe<RecognizedViews>("recognized", 1, take);
@@ -248,7 +259,8 @@ private:
     if (const std::string view = seen(); !view.empty())
     {
       ROS_INFO_STREAM("the route begins at view '" << view << "', which the recognizer sees");
-      stops.erase(stops.begin(), std::find_if(stops.begin(), stops.end(), is_at(view)));
+      stops.erase(stops.begin(),
+                  std::find_if(stops.begin(), stops.end(), [&](const RouteStop& stop) { return stop.view == view; }));
     }
   }
 
@@ -261,9 +273,17 @@ private:
   void orderNext()
   {
     next_.reset();
-    if (!guide_->last())
+    order(guide_->next());
+  }
+
+  /** Has a view read; empty: none any more. @param jumps the base drives to it at once, wherever it is. */
+  void order(const std::string& view, bool jumps = false)
+  {
+    ordered_ = view;
+    jumps_ = jumps;
+    if (!view.empty())
     {
-      worker_.put([this](Order& order) { order = { context_.goalId(), guide_->next(), frame_ }; });
+      worker_.put([&](Order& order) { order = { context_.goalId(), view, frame_ }; });
     }
   }
 
@@ -275,17 +295,26 @@ private:
       task = homing_.makeTask(loadLearntView(homing_.store(), order.view), order.frame, params_.homing);
     });
     context_.locked([&] {
-      if (!guide_ || context_.goalId() != order.goal || guide_->next() != order.view)
+      if (!guide_ || context_.goalId() != order.goal || ordered_ != order.view)
       {
         return;
       }
-      if (fault.empty())
+      if (!fault.empty())
+      {
+        context_.abort("the route cannot go on: " + fault);
+      }
+      else if (order.view == guide_->next() && !jumps_)
       {
         next_ = task;
       }
+      else if (!lost_since_)
+      {
+        orderNext();  // the view was found again meanwhile
+      }
       else
       {
-        context_.abort("the route cannot go on: " + fault);
+        guide_->goTo(order.view);
+        driveTo(task);
       }
     });
   }
@@ -309,14 +338,67 @@ private:
     if (guide_->due() && next_)
     {
       guide_->goOn();
-      ROS_INFO_STREAM("the route goes on to view '" << guide_->view() << "', " << guide_->number() << " of "
-                                                    << guide_->count());
-      homing_.setTask(std::exchange(next_, nullptr));
-      homing_.want(guide_->view(), context_.goalId());
-      context_.requestNextView(guide_->view());
-      orderNext();
+      driveTo(std::exchange(next_, nullptr));
     }
     homing_.setDoesWithoutMatches(blindCourse().has_value());
+    const HomingState state = homing_.report().state;
+    if (state != HomingState::ACQUIRING && state != HomingState::LOST)
+    {
+      lost_since_.reset();
+    }
+    else if (!lost_since_)
+    {
+      lost_since_ = ros::WallTime::now();
+    }
+  }
+
+  /** From now on the guide's view is homed to. */
+  void driveTo(std::shared_ptr<HomingTask> task)
+  {
+    ROS_INFO_STREAM("the route goes on to view '" << guide_->view() << "', " << guide_->number() << " of "
+                                                  << guide_->count());
+    homing_.setTask(std::move(task));
+    homing_.want(guide_->view(), context_.goalId());
+    context_.requestNextView(guide_->view());
+    lost_since_.reset();
+    orderNext();
+  }
+
+  /**
+   * Listens to a recognizer, if there is one, while the view has not been found for a while. By homing's thread, as it may
+   * take a while.
+   */
+  void listenToRecognizer()
+  {
+    const ros::WallDuration patience(2.0);
+    const bool lost =
+        context_.locked([&] { return guide_ && lost_since_ && ros::WallTime::now() - *lost_since_ > patience; });
+    if (!lost)
+    {
+      recognized_.shutdown();
+    }
+    else if (!recognized_)
+    {
+      const ros::Time now = ros::Time::now();
+      const boost::function<void(const RecognizedViews::ConstPtr&)> take =
+          [this, now](const RecognizedViews::ConstPtr& message) {
+            context_.runLocked("a recognizer's answer", [&] { onRecognized(*message, now); });
+          };
+      recognized_ = context_.nodeHandle().subscribe<RecognizedViews>("recognized", 1, take);
+    }
+  }
+
+  /** The base goes on at the view that a recognizer sees. @param since older images do not count. */
+  void onRecognized(const RecognizedViews& message, const ros::Time& since)
+  {
+    if (guide_ && lost_since_ && context_.goalRuns() && message.header.stamp >= since)
+    {
+      const std::string view = seenOf(stops_, message);
+      if (!view.empty() && view != guide_->view() && !(jumps_ && view == ordered_))
+      {
+        order(view, true);
+      }
+    }
   }
 
   DriverContext& context_;
@@ -325,6 +407,11 @@ private:
   std::optional<RouteGuide> guide_;   // while a goal runs
   std::shared_ptr<HomingTask> next_;  // to the view after this one, once it is read
   CameraFrame frame_;
+  std::vector<RouteStop> stops_;             // of the goal
+  std::string ordered_;                      // the view that is read, or was last
+  bool jumps_ = false;                       // the base drives to that one at once
+  std::optional<ros::WallTime> lost_since_;  // the view is not found
+  ros::Subscriber recognized_;               // homing's thread's alone
   // Their threads use what is above, and each other only while a goal runs.
   Worker<Order> worker_;
   ViewHoming homing_;

@@ -156,6 +156,19 @@ TEST(RouteGuide, LeadsByOdometryWithinBounds)
   }
 }
 
+TEST(RouteGuide, GoesToAnyViewOfTheWay)
+{
+  RouteGuide guide(RouteGuideParams(), makeRoute().stops, 0.1);
+  const PlanarPose at_a{ 10.0, 5.0, 0.5 };
+  guide.see(trackedReport(at_a, at_a, true), at_a);
+  guide.goTo("c");
+  EXPECT_EQ(guide.view(), "c");
+  EXPECT_TRUE(guide.last());
+  EXPECT_FALSE(guide.due());
+  EXPECT_FALSE(guide.blindCourse()) << "where it is is not known";
+  EXPECT_THROW(guide.goTo("x"), std::logic_error);
+}
+
 TEST(RouteGuide, SaysHowTheBaseIsPlacedOnTheLine)
 {
   RouteGuide guide(RouteGuideParams(), makeRoute().stops, 0.1);

@@ -464,6 +464,28 @@ TEST_F(UnmatchedTest, GoesOnByOdometryNoFartherThanItMay)
   EXPECT_LT(gone, BLIND_DISTANCE + BRAKING);
 }
 
+TEST_F(UnmatchedTest, GoesOnAtTheViewThatARecognizerSees)
+{
+  recordHall();
+  ros::Publisher recognizer = nh_.advertise<RecognizedViews>("recognized", 1);
+  putAt({ -2.05, 0.1, 0.0 });
+  send("hall", "hall_001");
+  ASSERT_TRUE(waitUntil([&] { return wanted_.last() && wanted_.last()->view == unmatched_; })) << reason();
+  EXPECT_TRUE(waitUntil([&] { return wanted_.last()->view == "hall_004"; },
+                        [&] {
+                          RecognizedViews message;
+                          message.header.stamp = ros::Time::now();
+                          message.views.resize(1);
+                          message.views[0].view = "hall_004";
+                          message.views[0].verified = 1;
+                          recognizer.publish(message);
+                        }))
+      << reason();
+  const FollowRouteResult final = result();
+  EXPECT_TRUE(final.success) << final.message;
+  EXPECT_LT(compose(inverse(hall_end), truth()).distance(), 0.01);
+}
+
 TEST_F(RoutesTest, RefusesBeforeAnythingMoves)
 {
   recordHall();

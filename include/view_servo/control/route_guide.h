@@ -85,6 +85,8 @@ public:
   }
   /** From now on the next view is homed to. There has to be one. */
   void goOn();
+  /** From now on this view is homed to, and nothing is known of where it is. It has to be on the way. */
+  void goTo(const std::string& view);
 
   /**
    * The way to view() by odometry, while homing does not know it: from the last view and how the two were recorded. Empty
