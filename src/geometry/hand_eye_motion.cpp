@@ -87,7 +87,7 @@ HandEyeMotion motionOf(const Problem& problem, const std::vector<HandEyePose>& p
   std::vector<Eigen::Vector3d> places;
   for (const EuclideanHomography& homography : problem.motionsBefore(normal))
   {
-    places.push_back(-homography.rotation.transpose() * homography.translation_over_distance);
+    places.emplace_back(-homography.rotation.transpose() * homography.translation_over_distance);
     for (const Eigen::Vector3d& place : places)
     {
       motion.travel = std::max(motion.travel, (place - places.back()).norm());
