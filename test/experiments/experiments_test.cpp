@@ -57,10 +57,10 @@ TEST(Experiments, RefusesRunsWhereNothingIsRepeated)
     const ProgramRun outcome = run(name + " --runs 3");
     EXPECT_EQ(outcome.status, 2);
     expectContains(outcome.err, "--runs: " + name + " repeats nothing");
-    expectContains(
-        outcome.err,
-        "homing, homing_differential, homing_structure, arm, multi_hypothesis, real_pairs, profiles_parameters, "
-        "view_consistency, false_answers, recognition, hand_eye, cyclic_order do");
+    expectContains(outcome.err,
+                   "homing, homing_differential, homing_structure, routes, arm, multi_hypothesis, real_pairs, "
+                   "profiles_parameters, "
+                   "view_consistency, false_answers, recognition, hand_eye, cyclic_order do");
   }
 }
 
