@@ -60,7 +60,7 @@ Camera readCameraFile(const std::string& path)
 {
   try
   {
-    Camera camera = anyCameraFromYaml(loadSmallYamlFile(path, "no calibration"));
+    Camera camera = anyCameraFromYaml(loadSmallYamlFile(path));
     const std::string fault = camera.fault();
     if (!fault.empty())
     {

@@ -85,7 +85,7 @@ HandEyeFile readHandEyeFile(const std::string& path)
 {
   try
   {
-    return fromYaml(loadSmallYamlFile(path, "none"));
+    return fromYaml(loadSmallYamlFile(path));
   }
   catch (const std::exception& error)
   {

@@ -10,7 +10,7 @@
 
 namespace view_servo
 {
-YAML::Node loadSmallYamlFile(const std::string& path, const std::string& none)
+YAML::Node loadSmallYamlFile(const std::string& path)
 {
   constexpr std::uintmax_t LARGEST = 1000000;  // [bytes]
   std::error_code error;
@@ -20,7 +20,7 @@ YAML::Node loadSmallYamlFile(const std::string& path, const std::string& none)
   }
   if (std::filesystem::file_size(path) > LARGEST)
   {
-    throw std::runtime_error("it is " + none + ", being larger than 1 MB");
+    throw std::runtime_error("it is larger than 1 MB, as no such file is");
   }
   std::ifstream file(path);
   return YAML::Load(file);

@@ -9,9 +9,9 @@
 namespace view_servo
 {
 /**
- * What a yaml file of at most 1 MB holds. @param none what a larger file is not, for the message: "no calibration", say.
+ * What a yaml file of at most 1 MB holds.
  * @throws std::exception when there is no regular file, when it is larger, or when it is no yaml.
  */
-YAML::Node loadSmallYamlFile(const std::string& path, const std::string& none);
+YAML::Node loadSmallYamlFile(const std::string& path);
 
 }  // namespace view_servo
