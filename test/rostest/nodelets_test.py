@@ -110,7 +110,7 @@ class Nodelets(graph.GraphTest):
         return any((last.linear.x, last.linear.y, last.angular.z))
 
     def assert_zero_is_sent(self, end):
-        """Has a base driven by a nodelet. @param end ends that, called with the manager."""
+        """Has a base driven by a nodelet. @param end ends that. @return the manager."""
         manager = self.start_manager()
         subscriber = rospy.Subscriber("/cmd_vel", Twist, self.commands.append)
         self.addCleanup(subscriber.unregister)
@@ -119,25 +119,27 @@ class Nodelets(graph.GraphTest):
         self.graph.start("rosrun", "view_servo", "run_homing", "_patience:=%g" % PATIENCE, "_exit:=false")
         self.wait("commands that move the base", self.moves)
         self.assertEqual(self.graph.state()[0]["/cmd_vel"], ["/" + MANAGER])
-        end(manager)
+        end()
         self.wait("the end of homing", lambda: not self.graph.state()[0].get("/cmd_vel"))
         self.wait("zero as the last command", lambda: not self.moves())
         return manager
 
     def test_zero_is_sent_when_a_driver_is_unloaded_and_the_manager_goes_on(self):
-        manager = self.assert_zero_is_sent(lambda _: os.kill(self.pid("/homing"), signal.SIGINT))
+        manager = self.assert_zero_is_sent(lambda: os.kill(self.pid("/homing"), signal.SIGINT))
         self.assertIsNone(manager.poll(), self.graph.log())
+        self.graph.run("rosnode kill /" + MANAGER)
+        self.assertEqual(manager.wait(PATIENCE), 0, self.graph.log())
 
     def test_zero_is_sent_when_the_manager_is_interrupted(self):
-        manager = self.assert_zero_is_sent(lambda _: os.kill(self.pid("/" + MANAGER), signal.SIGINT))
+        manager = self.assert_zero_is_sent(lambda: os.kill(self.pid("/" + MANAGER), signal.SIGINT))
         self.assertEqual(manager.wait(PATIENCE), 0, self.graph.log())
 
     def test_zero_is_sent_when_the_manager_is_terminated(self):
-        manager = self.assert_zero_is_sent(lambda _: os.kill(self.pid("/" + MANAGER), signal.SIGTERM))
+        manager = self.assert_zero_is_sent(lambda: os.kill(self.pid("/" + MANAGER), signal.SIGTERM))
         self.assertEqual(manager.wait(PATIENCE), 0, self.graph.log())
 
     def test_zero_is_sent_when_the_manager_is_ended_by_rosnode_kill(self):
-        manager = self.assert_zero_is_sent(lambda _: self.graph.run("rosnode kill /" + MANAGER))
+        manager = self.assert_zero_is_sent(lambda: self.graph.run("rosnode kill /" + MANAGER))
         self.assertEqual(manager.wait(PATIENCE), 0, self.graph.log())
 
     def assert_arrives(self, launch_file):
