@@ -2,18 +2,19 @@
 // SPDX-License-Identifier: BSD-3-Clause
 
 /** @file
- * What it costs to bring a camera's images to the nodes of homing.launch: as processes, as nodelets of one process, and as
- * nodelets in the camera's own process, in one run:
+ * What it costs to bring a camera's images to the nodes of homing.launch or arm_servo.launch: as processes, as nodelets of one
+ * process, and as nodelets in the camera's own process, in one run:
  *
- *     bench_transport [--seconds N]
+ *     bench_transport homing|arm [--seconds N]
  *
  * It starts a master of its own and plays a camera of rgb8 images at 30 Hz, of 640x480 and of 1280x720, that looks at a
  * stored view. For each it prints processor time, that of the camera and of all nodes [% of one core]: of the transport,
  * which is the difference between images that come and are not worked on, as no view is wanted, and no images; and of
  * everything while the view is matched, with how many matches come a second, which a busy machine makes fewer, and the time
- * from an image's stamp to its point_matches, median. Each is taken over N seconds.
+ * from an image's stamp to its point_matches, median; with the arm, of homographies. Each is taken over N seconds.
  */
 #include "timing.h"
+#include "view_servo/Homography.h"
 #include "view_servo/PointMatches.h"
 #include "view_servo/robust/quantile.h"
 #include "view_servo/ros/conversions.h"
@@ -301,11 +302,27 @@ struct Measured
   double latency = 0.0;  ///< median [ms]
 };
 
+/** What is launched. */
+struct Robot
+{
+  std::string launch_file;
+  std::vector<std::string> services;  ///< that are there when all nodes are
+};
+
+const std::map<std::string, Robot> ROBOTS{
+  { "homing",
+    { "homing.launch", { "homing/enable", "point_matcher/match", "line_matcher/match", "view_store/list" } } },
+  { "arm",
+    { "arm_servo.launch",
+      { "servo_25d/enable", "homography_tracker/start", "point_matcher/match", "line_matcher/match",
+        "view_store/list" } } },
+};
+
 class Bench
 {
 public:
-  Bench(std::filesystem::path directory, double seconds)
-    : directory_(std::move(directory)), seconds_(seconds), views_(directory_ / "views")
+  Bench(const std::string& robot, std::filesystem::path directory, double seconds)
+    : robot_(ROBOTS.at(robot)), directory_(std::move(directory)), seconds_(seconds), views_(directory_ / "views")
   {
     geometry_msgs::TransformStamped mount;
     mount.header.frame_id = "base_link";
@@ -315,12 +332,20 @@ public:
     mount.transform.rotation.y = mount.transform.rotation.w = 0.5;
     broadcaster_.sendTransform(mount);
     ros::NodeHandle nh;
-    const boost::function<void(const PointMatches::ConstPtr&)> take = [this](const PointMatches::ConstPtr& message) {
-      const std::lock_guard<std::mutex> lock(mutex_);
-      ages_.push_back(1e3 * (ros::Time::now() - message->header.stamp).toSec());
-      inliers_ = message->homography.inliers;
-    };
-    matches_ = nh.subscribe<PointMatches>("point_matcher/point_matches", 20, take);
+    if (robot == "homing")
+    {
+      const boost::function<void(const PointMatches::ConstPtr&)> take = [this](const PointMatches::ConstPtr& message) {
+        add(message->homography);
+      };
+      results_ = nh.subscribe<PointMatches>("point_matcher/point_matches", 20, take);
+    }
+    else
+    {
+      const boost::function<void(const Homography::ConstPtr&)> take = [this](const Homography::ConstPtr& message) {
+        add(*message);
+      };
+      results_ = nh.subscribe<Homography>("homography_tracker/homography", 20, take);
+    }
   }
 
   Measured measure(const cv::Mat& picture, Home home)
@@ -352,10 +377,19 @@ public:
   }
 
 private:
+  void add(const Homography& homography)
+  {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    if (homography.valid != 0)
+    {
+      ages_.push_back(1e3 * (ros::Time::now() - homography.header.stamp).toSec());
+    }
+  }
+
   /** The nodes, once they are there and, when a view is named, match it. */
   std::unique_ptr<Child> start(Home home, const std::string& view)
   {
-    std::vector<std::string> command{ "roslaunch",    "view_servo",    "homing.launch",
+    std::vector<std::string> command{ "roslaunch",    "view_servo",    robot_.launch_file,
                                       "sim:=false",   "view:=" + view, "views_dir:=" + views_.directory().string(),
                                       "dry_run:=true" };
     if (home != Home::PROCESSES)
@@ -367,16 +401,16 @@ private:
       command.push_back("manager:=" + NAME);
     }
     auto nodes = std::make_unique<Child>(command, directory_ / "nodes.log");
-    for (const char* service : { "homing/enable", "point_matcher/match", "line_matcher/match", "view_store/list" })
+    for (const std::string& service : robot_.services)
     {
-      require("the service " + std::string(service), [&] { return ros::service::exists(service, false); });
+      require("the service " + service, [&] { return ros::service::exists(service, false); });
     }
     if (!view.empty())
     {
       takeAges();
       require("matches of the view", [this] {
         const std::lock_guard<std::mutex> lock(mutex_);
-        return !ages_.empty() && inliers_ > 0;
+        return !ages_.empty();
       });
     }
     return nodes;
@@ -402,14 +436,14 @@ private:
     return std::exchange(ages_, {});
   }
 
+  const Robot& robot_;
   const std::filesystem::path directory_;
   const double seconds_;
   const ViewStore views_;
   tf2_ros::StaticTransformBroadcaster broadcaster_;
-  ros::Subscriber matches_;
+  ros::Subscriber results_;
   std::mutex mutex_;  // guards what follows
   std::vector<double> ages_;
-  int inliers_ = 0;
 };
 
 void print(const cv::Size& size, const char* home, const Measured& m)
@@ -420,9 +454,9 @@ void print(const cv::Size& size, const char* home, const Measured& m)
   std::fflush(stdout);
 }
 
-void measureAll(const std::filesystem::path& directory, double seconds)
+void measureAll(const std::string& robot, const std::filesystem::path& directory, double seconds)
 {
-  Bench bench(directory, seconds);
+  Bench bench(robot, directory, seconds);
   const ViewStore samples(ros::package::getPath("view_servo") + "/samples/views");
   const cv::Mat picture = samples.load(VIEW).image;
   std::printf(
@@ -441,15 +475,16 @@ void measureAll(const std::filesystem::path& directory, double seconds)
 
 int run(int argc, char** argv)
 {
-  double seconds = 10.0;
   const std::vector<std::string> arguments(argv + 1, argv + argc);
-  if (arguments.size() == 2 && arguments[0] == "--seconds")
+  const bool timed = arguments.size() == 3 && arguments[1] == "--seconds";
+  if (arguments.empty() || ROBOTS.count(arguments[0]) == 0 || (arguments.size() > 1 && !timed))
   {
-    seconds = std::stod(arguments[1]);
+    throw std::invalid_argument("it is " + NAME + " homing|arm [--seconds N]");
   }
-  else if (!arguments.empty())
+  const double seconds = timed ? std::atof(arguments[2].c_str()) : 10.0;
+  if (!(seconds >= 1.0 && seconds <= 600.0))
   {
-    throw std::invalid_argument("unknown option or no value: " + arguments[0] + "; it is " + NAME + " [--seconds N]");
+    throw std::invalid_argument("--seconds: a number from 1 to 600");
   }
   std::string directory = (std::filesystem::temp_directory_path() / "view_servo_bench_XXXXXX").string();
   if (mkdtemp(directory.data()) == nullptr)
@@ -465,7 +500,7 @@ int run(int argc, char** argv)
     ros::init(argc, argv, NAME);
     require("a master", [] { return ros::master::check(); });
     const ros::NodeHandle nh;
-    if (ros::console::set_logger_level(ROSCONSOLE_DEFAULT_NAME, ros::console::levels::Warn))
+    if (ros::console::set_logger_level(ROSCONSOLE_ROOT_LOGGER_NAME, ros::console::levels::Warn))
     {
       ros::console::notifyLoggerLevelsChanged();
     }
@@ -475,7 +510,7 @@ int run(int argc, char** argv)
       const nodelet::Loader loader;  // this process is a manager, too
       try
       {
-        measureAll(directory, seconds);
+        measureAll(arguments[0], directory, seconds);
       }
       catch (const std::exception& error)
       {
