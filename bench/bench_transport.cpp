@@ -36,7 +36,6 @@
 
 #include <arpa/inet.h>
 #include <fcntl.h>
-#include <signal.h>
 #include <spawn.h>
 #include <sys/socket.h>
 #include <sys/wait.h>
@@ -44,6 +43,7 @@
 
 #include <atomic>
 #include <chrono>
+#include <csignal>
 #include <cstdio>
 #include <cstdlib>
 #include <filesystem>
@@ -60,8 +60,6 @@
 #include <thread>
 #include <utility>
 #include <vector>
-
-extern char** environ;
 
 namespace
 {
@@ -105,6 +103,7 @@ public:
   Child(std::vector<std::string> command, const std::filesystem::path& log)
   {
     std::vector<char*> argv;
+    argv.reserve(command.size() + 1);
     for (std::string& word : command)
     {
       argv.push_back(word.data());
