@@ -29,11 +29,14 @@ function(precompile target group)
   endif()
 endfunction()
 
-# precompile_ros(TARGET): for static libraries and programs that include much of ROS.
+# precompile_ros(TARGET [GROUP]): for static libraries and programs that include much of ROS; of another group than others when
+# the code is for shared libraries.
 function(precompile_ros target)
+  set(group NODES ${ARGN})
+  list(GET group -1 group)
   # Of headers that are precompiled GCC warns although they are not ours: it takes parts of boost for uninitialized.
   target_compile_options(${target} PRIVATE $<$<CXX_COMPILER_ID:GNU>:-Wno-maybe-uninitialized> -Wno-uninitialized)
-  precompile(${target} NODES <actionlib/server/action_server.h> <diagnostic_updater/diagnostic_updater.h>
+  precompile(${target} ${group} <actionlib/server/action_server.h> <diagnostic_updater/diagnostic_updater.h>
     <image_transport/image_transport.h> <message_filters/time_synchronizer.h> <ros/ros.h> <sensor_msgs/CameraInfo.h>
     <sensor_msgs/Image.h> <tf2_ros/transform_listener.h> <opencv2/core.hpp> <Eigen/Geometry>)
 endfunction()

@@ -59,7 +59,7 @@ CameraListener::CameraListener(const ros::NodeHandle& nh, const Setup& setup)
   image_subscriber_.registerCallback([this](const CameraImageConstPtr& image) {
     guarded("an image on '" + image->topic + "'", [&] { onImage(image); });
   });
-  image_subscriber_.subscribe(nh, topics_.image, setup.image_transport, QUEUE_SIZE);
+  image_subscriber_.subscribe(nh, ros::NodeHandle("~"), topics_.image, setup.image_transport, QUEUE_SIZE);
   topics_.image = image_subscriber_.getTopic();
   const boost::function<void(const sensor_msgs::CameraInfoConstPtr&)> on_info =
       [this](const sensor_msgs::CameraInfoConstPtr& info) {

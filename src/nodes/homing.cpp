@@ -1,11 +1,14 @@
 // Copyright (c) 2026, the view_servo authors
 // SPDX-License-Identifier: BSD-3-Clause
+#include "nodes/nodes.h"
+
 #include "view_servo/HomeToViewAction.h"
 #include "view_servo/WantedView.h"
 #include "view_servo/parameters/error_text.h"
 #include "view_servo/ros/base_conversions.h"
 #include "view_servo/ros/driver_node.h"
 #include "view_servo/ros/idle_view.h"
+#include "view_servo/ros/node_type_of.h"
 #include "view_servo/ros/view_homing.h"
 
 #include <algorithm>
@@ -238,9 +241,6 @@ private:
   ViewHoming homing_;
 };
 
-}  // namespace view_servo
+const NodeType HOMING = driverType<DriverNode<HomingDriver>>("homing");
 
-int main(int argc, char** argv)
-{
-  return view_servo::runControlNode<view_servo::DriverNode<view_servo::HomingDriver>>(argc, argv, "homing");
-}
+}  // namespace view_servo

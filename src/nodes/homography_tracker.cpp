@@ -1,11 +1,14 @@
 // Copyright (c) 2026, the view_servo authors
 // SPDX-License-Identifier: BSD-3-Clause
+#include "nodes/nodes.h"
+
 #include "view_servo/Homography.h"
 #include "view_servo/SetView.h"
 #include "view_servo/ros/camera_input.h"
 #include "view_servo/ros/conversions.h"
 #include "view_servo/ros/node_base.h"
 #include "view_servo/ros/node_params.h"
+#include "view_servo/ros/node_type_of.h"
 #include "view_servo/ros/parameters.h"
 #include "view_servo/ros/plane_searcher.h"
 #include "view_servo/ros/plane_session.h"
@@ -19,9 +22,12 @@
 #include <image_transport/image_transport.h>
 #include <ros/publisher.h>
 #include <ros/subscriber.h>
+#include <sensor_msgs/Image.h>
 #include <sensor_msgs/image_encodings.h>
 #include <std_srvs/Trigger.h>
 #include <Eigen/Geometry>
+#include <boost/make_shared.hpp>
+#include <boost/shared_ptr.hpp>
 
 #include <atomic>
 #include <chrono>
@@ -120,8 +126,8 @@ public:
       params_(readTrackerParams(private_nh)),
       finder_(params_.matching),
       searcher_(finder_, params_.match_period, [this] { onAnswer(); }),
-      camera_(nh, params_.camera, [this](const CameraFrame& frame) { onFrame(frame); }),
-      starter_(params_.sessions, finder_.features(), camera_),
+      camera_(nh, private_nh, params_.camera, [this](const CameraFrame& frame) { onFrame(frame); }),
+      starter_(nh, params_.sessions, finder_.features(), camera_),
       transport_(private_nh)
   {
     homography_publisher_ = private_nh_.advertise<Homography>("homography", 5);
@@ -410,7 +416,8 @@ private:
           std::to_string(found.supporting) + " of " + std::to_string(found.looked_for) + " points";
       const std::string text =
           task.chosen.view + ": " + nameOf(track.state) + (reason.empty() ? ", " + points : ": " + reason);
-      overlay_publisher_.publish(toImage(session_->overlay(text), sensor_msgs::image_encodings::BGR8, header));
+      overlay_publisher_.publish(boost::make_shared<const sensor_msgs::Image>(
+          toImage(session_->overlay(text), sensor_msgs::image_encodings::BGR8, header)));
     }
   }
 
@@ -468,13 +475,13 @@ private:
   void publishHomography(const Task& task, const PlaneTrack& track, const std_msgs::Header& header,
                          const std::string& reason, bool refused)
   {
-    Homography message = toHomography(track, task.chosen.view, header, reason);
-    message.goal = task.chosen.goal;
-    message.refused = refused;
+    const auto message = boost::make_shared<Homography>(toHomography(track, task.chosen.view, header, reason));
+    message->goal = task.chosen.goal;
+    message->refused = refused;
     const std::lock_guard<std::mutex> lock(mutex_);
     if (task.number == task_number_)  // else another view is followed by now
     {
-      homography_publisher_.publish(message);
+      homography_publisher_.publish(boost::shared_ptr<const Homography>(message));
     }
   }
 
@@ -534,9 +541,6 @@ private:
   std::thread follower_;
 };
 
-}  // namespace view_servo
+const NodeType HOMOGRAPHY_TRACKER = nodeType<HomographyTrackerNode>("homography_tracker");
 
-int main(int argc, char** argv)
-{
-  return view_servo::runNode<view_servo::HomographyTrackerNode>(argc, argv, "homography_tracker");
-}
+}  // namespace view_servo

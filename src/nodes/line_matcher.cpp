@@ -1,9 +1,12 @@
 // Copyright (c) 2026, the view_servo authors
 // SPDX-License-Identifier: BSD-3-Clause
+#include "nodes/nodes.h"
+
 #include "view_servo/LineMatches.h"
 #include "view_servo/MatchLines.h"
 #include "view_servo/ros/conversions.h"
 #include "view_servo/ros/node_base.h"
+#include "view_servo/ros/node_type_of.h"
 #include "view_servo/ros/parameters.h"
 #include "view_servo/ros/streaming_matcher.h"
 #include "view_servo/views/line_view_matcher.h"
@@ -104,9 +107,6 @@ private:
  */
 using LineMatcherNode = StreamingMatcher<LineMatching>;
 
-}  // namespace view_servo
+const NodeType LINE_MATCHER = nodeType<LineMatcherNode>("line_matcher");
 
-int main(int argc, char** argv)
-{
-  return view_servo::runNode<view_servo::LineMatcherNode>(argc, argv, "line_matcher");
-}
+}  // namespace view_servo

@@ -1,9 +1,12 @@
 // Copyright (c) 2026, the view_servo authors
 // SPDX-License-Identifier: BSD-3-Clause
+#include "nodes/nodes.h"
+
 #include "view_servo/MatchPoints.h"
 #include "view_servo/PointMatches.h"
 #include "view_servo/ros/conversions.h"
 #include "view_servo/ros/node_base.h"
+#include "view_servo/ros/node_type_of.h"
 #include "view_servo/ros/parameters.h"
 #include "view_servo/ros/streaming_matcher.h"
 #include "view_servo/views/point_view_matcher.h"
@@ -117,9 +120,6 @@ private:
  */
 using PointMatcherNode = StreamingMatcher<PointMatching>;
 
-}  // namespace view_servo
+const NodeType POINT_MATCHER = nodeType<PointMatcherNode>("point_matcher");
 
-int main(int argc, char** argv)
-{
-  return view_servo::runNode<view_servo::PointMatcherNode>(argc, argv, "point_matcher");
-}
+}  // namespace view_servo

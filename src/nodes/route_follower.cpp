@@ -1,10 +1,13 @@
 // Copyright (c) 2026, the view_servo authors
 // SPDX-License-Identifier: BSD-3-Clause
+#include "nodes/nodes.h"
+
 #include "view_servo/FollowRouteAction.h"
 #include "view_servo/RecognizedViews.h"
 #include "view_servo/control/route_guide.h"
 #include "view_servo/ros/driver_node.h"
 #include "view_servo/ros/image_source.h"
+#include "view_servo/ros/node_type_of.h"
 #include "view_servo/ros/view_homing.h"
 #include "view_servo/ros/worker.h"
 #include "view_servo/views/route_store.h"
@@ -417,9 +420,6 @@ private:
   ViewHoming homing_;
 };
 
-}  // namespace view_servo
+const NodeType ROUTE_FOLLOWER = driverType<DriverNode<RouteDriver>>("route_follower");
 
-int main(int argc, char** argv)
-{
-  return view_servo::runControlNode<view_servo::DriverNode<view_servo::RouteDriver>>(argc, argv, "route_follower");
-}
+}  // namespace view_servo

@@ -1,5 +1,7 @@
 // Copyright (c) 2026, the view_servo authors
 // SPDX-License-Identifier: BSD-3-Clause
+#include "nodes/nodes.h"
+
 #include "view_servo/StartRoute.h"
 #include "view_servo/control/odometry_history.h"
 #include "view_servo/parameters/error_text.h"
@@ -9,6 +11,7 @@
 #include "view_servo/ros/image_source.h"
 #include "view_servo/ros/node_base.h"
 #include "view_servo/ros/node_params.h"
+#include "view_servo/ros/node_type_of.h"
 #include "view_servo/ros/odometry_input.h"
 #include "view_servo/ros/readiness.h"
 #include "view_servo/ros/transform_source.h"
@@ -49,11 +52,12 @@ public:
       params_(readParams<RouteRecorderParams>(private_nh)),
       base_frame_(withoutSlash(params_.base_frame)),
       routes_(viewsDir(params_.views_dir)),
+      transforms_(nh),
       odometry_input_("odometry", "'" + nh_.resolveName("odom") + "'", LONGEST_GAP),
       odometry_(odometry_input_, transforms_, base_frame_, params_.odometry_delay),
       history_(HISTORY),
       worker_("a view of a route", [this](Place&& place) { work(place); }),
-      camera_(nh, params_.camera, [this](const CameraFrame& frame) { onFrame(frame); })
+      camera_(nh, private_nh, params_.camera, [this](const CameraFrame& frame) { onFrame(frame); })
   {
     odometry_subscriber_ =
         subscribe<nav_msgs::Odometry>("odom", 10, [this](const nav_msgs::Odometry::ConstPtr& m) { onOdometry(*m); });
@@ -414,9 +418,6 @@ private:
   ros::ServiceServer stop_service_;
 };
 
-}  // namespace view_servo
+const NodeType ROUTE_RECORDER = nodeType<RouteRecorderNode>("route_recorder");
 
-int main(int argc, char** argv)
-{
-  return view_servo::runNode<view_servo::RouteRecorderNode>(argc, argv, "route_recorder");
-}
+}  // namespace view_servo

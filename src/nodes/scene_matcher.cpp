@@ -1,13 +1,16 @@
 // Copyright (c) 2026, the view_servo authors
 // SPDX-License-Identifier: BSD-3-Clause
-#include "view_servo/views/scene_matcher.h"
+#include "nodes/nodes.h"
+
 #include "view_servo/MatchScene.h"
 #include "view_servo/SceneMatches.h"
 #include "view_servo/geometry/fundamental.h"
 #include "view_servo/ros/conversions.h"
 #include "view_servo/ros/node_base.h"
+#include "view_servo/ros/node_type_of.h"
 #include "view_servo/ros/parameters.h"
 #include "view_servo/ros/streaming_matcher.h"
+#include "view_servo/views/scene_matcher.h"
 #include "view_servo/views/scene_motion.h"
 
 #include <Eigen/Core>
@@ -210,9 +213,6 @@ private:
  */
 using SceneMatcherNode = StreamingMatcher<SceneMatching>;
 
-}  // namespace view_servo
+const NodeType SCENE_MATCHER = nodeType<SceneMatcherNode>("scene_matcher");
 
-int main(int argc, char** argv)
-{
-  return view_servo::runNode<view_servo::SceneMatcherNode>(argc, argv, "scene_matcher");
-}
+}  // namespace view_servo

@@ -1,10 +1,12 @@
 // Copyright (c) 2026, the view_servo authors
 // SPDX-License-Identifier: BSD-3-Clause
-#include "view_servo/control/servo_25d.h"
+#include "nodes/nodes.h"
+
 #include "view_servo/Homography.h"
 #include "view_servo/ServoError.h"
 #include "view_servo/ServoToViewAction.h"
 #include "view_servo/control/joint_guard.h"
+#include "view_servo/control/servo_25d.h"
 #include "view_servo/geometry/camera_warp.h"
 #include "view_servo/geometry/region.h"
 #include "view_servo/parameters/error_text.h"
@@ -12,6 +14,7 @@
 #include "view_servo/ros/conversions.h"
 #include "view_servo/ros/driver_node.h"
 #include "view_servo/ros/image_source.h"
+#include "view_servo/ros/node_type_of.h"
 #include "view_servo/ros/transform_source.h"
 #include "view_servo/ros/view_answer.h"
 #include "view_servo/views/view_store.h"
@@ -410,9 +413,6 @@ private:
   ros::Publisher error_publisher_;
 };
 
-}  // namespace view_servo
+const NodeType SERVO_25D = driverType<DriverNode<ServoDriver>>("servo_25d");
 
-int main(int argc, char** argv)
-{
-  return view_servo::runControlNode<view_servo::DriverNode<view_servo::ServoDriver>>(argc, argv, "servo_25d");
-}
+}  // namespace view_servo

@@ -1,6 +1,7 @@
 // Copyright (c) 2026, the view_servo authors
 // SPDX-License-Identifier: BSD-3-Clause
-#include "view_servo/views/view_recognizer.h"
+#include "nodes/nodes.h"
+
 #include "view_servo/RecognizeView.h"
 #include "view_servo/RecognizedViews.h"
 #include "view_servo/ros/camera_input.h"
@@ -8,9 +9,11 @@
 #include "view_servo/ros/image_source.h"
 #include "view_servo/ros/node_base.h"
 #include "view_servo/ros/node_params.h"
+#include "view_servo/ros/node_type_of.h"
 #include "view_servo/ros/parameters.h"
 #include "view_servo/ros/worker.h"
 #include "view_servo/views/prepared_image.h"
+#include "view_servo/views/view_recognizer.h"
 
 #include <diagnostic_msgs/DiagnosticStatus.h>
 #include <diagnostic_updater/DiagnosticStatusWrapper.h>
@@ -101,7 +104,7 @@ public:
   ViewRecognizerNode(const ros::NodeHandle& nh, const ros::NodeHandle& private_nh)
     : NodeBase(nh, private_nh),
       params_(readParams<ViewRecognizerNodeParams>(private_nh)),
-      camera_(nh, params_.camera, [this](const CameraFrame& frame) { onFrame(frame); }),
+      camera_(nh, private_nh, params_.camera, [this](const CameraFrame& frame) { onFrame(frame); }),
       sources_(params_.sources, camera_),
       recognizer_(storedViews(sources_.store()), params_.recognition),
       worker_("recognition", [this](std::optional<CameraFrame>&& frame) { recognizeFrame(*frame); })
@@ -262,9 +265,6 @@ private:
   std::thread indexer_;
 };
 
-}  // namespace view_servo
+const NodeType VIEW_RECOGNIZER = nodeType<ViewRecognizerNode>("view_recognizer");
 
-int main(int argc, char** argv)
-{
-  return view_servo::runNode<view_servo::ViewRecognizerNode>(argc, argv, "view_recognizer");
-}
+}  // namespace view_servo

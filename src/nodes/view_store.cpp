@@ -1,6 +1,7 @@
 // Copyright (c) 2026, the view_servo authors
 // SPDX-License-Identifier: BSD-3-Clause
-#include "view_servo/views/view_store.h"
+#include "nodes/nodes.h"
+
 #include "view_servo/DeleteView.h"
 #include "view_servo/GetView.h"
 #include "view_servo/ListViews.h"
@@ -12,8 +13,10 @@
 #include "view_servo/ros/image_source.h"
 #include "view_servo/ros/node_base.h"
 #include "view_servo/ros/node_params.h"
+#include "view_servo/ros/node_type_of.h"
 #include "view_servo/ros/parameters.h"
 #include "view_servo/ros/transform_source.h"
+#include "view_servo/views/view_store.h"
 
 #include <sensor_msgs/image_encodings.h>
 
@@ -50,7 +53,8 @@ public:
   ViewStoreNode(const ros::NodeHandle& nh, const ros::NodeHandle& private_nh)
     : NodeBase(nh, private_nh),
       params_(readParams<ViewStoreNodeParams>(private_nh)),
-      camera_(nh, params_.camera),
+      transforms_(nh),
+      camera_(nh, private_nh, params_.camera),
       sources_(params_.sources, camera_),
       store_(sources_.store())
   {
@@ -175,9 +179,6 @@ private:
   ros::ServiceServer get_service_;
 };
 
-}  // namespace view_servo
+const NodeType VIEW_STORE = nodeType<ViewStoreNode>("view_store");
 
-int main(int argc, char** argv)
-{
-  return view_servo::runNode<view_servo::ViewStoreNode>(argc, argv, "view_store");
-}
+}  // namespace view_servo

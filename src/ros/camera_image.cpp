@@ -71,11 +71,11 @@ cv::Mat toGrey(const CameraImage& image)
   return image.packed ? toGrey(*image.packed, image.topic) : toGrey(*image.raw, image.topic);
 }
 
-void CameraImageSubscriber::subscribe(const ros::NodeHandle& nh, const std::string& topic, const std::string& transport,
-                                      int queue_size)
+void CameraImageSubscriber::subscribe(const ros::NodeHandle& nh, const ros::NodeHandle& private_nh,
+                                      const std::string& topic, const std::string& transport, int queue_size)
 {
   image_transport::ImageTransport images(nh);
-  const image_transport::TransportHints hints(transport);
+  const image_transport::TransportHints hints(transport, ros::TransportHints(), private_nh);
   const std::string wanted = hints.getTransport();
   std::vector<std::string> names = installedTransports(images);
   const auto length = static_cast<std::uint32_t>(queue_size);

@@ -36,8 +36,8 @@ std::vector<Parameter> parameters(CameraInputParams& params)
   };
 }
 
-CameraInput::CameraInput(const ros::NodeHandle& nh, const CameraInputParams& params, Callback on_frame,
-                         std::function<void(const std::string&)> on_problem)
+CameraInput::CameraInput(const ros::NodeHandle& nh, const ros::NodeHandle& private_nh, const CameraInputParams& params,
+                         Callback on_frame, std::function<void(const std::string&)> on_problem)
   : params_(params),
     on_frame_(std::move(on_frame)),
     on_problem_(std::move(on_problem)),
@@ -54,7 +54,7 @@ CameraInput::CameraInput(const ros::NodeHandle& nh, const CameraInputParams& par
     ++infos_;
     unpaired_ = 0;
   });
-  image_subscriber_.subscribe(nh, "image_raw", params.image_transport, params.queue_size);
+  image_subscriber_.subscribe(nh, private_nh, "image_raw", params.image_transport, params.queue_size);
   info_subscriber_.subscribe(topics_nh, "camera_info", queue_size);
   check_timer_ =
       topics_nh.createWallTimer(ros::WallDuration(CHECK_PERIOD), [this](const ros::WallTimerEvent&) { checkInputs(); });

@@ -2,18 +2,24 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "view_servo/ros/control_node.h"
 
+#include <ros/init.h>
 #include <ros/xmlrpc_manager.h>
 
+#include <algorithm>
 #include <atomic>
 #include <csignal>
 #include <limits>
+#include <mutex>
+#include <thread>
 #include <utility>
+#include <vector>
 
 namespace view_servo
 {
 namespace
 {
 std::atomic<bool> g_shutdown_requested{ false };  // set by signals, read by several threads
+std::atomic<bool> g_is_deferred{ false };         // somebody looks at it
 
 void requestShutdown(int /*signal*/)
 {
@@ -23,8 +29,93 @@ void requestShutdown(int /*signal*/)
 /** The master's call, as `rosnode kill` makes it. */
 void shutdownCallback(XmlRpc::XmlRpcValue& /*parameters*/, XmlRpc::XmlRpcValue& result)
 {
-  g_shutdown_requested = true;
+  g_is_deferred ? requestShutdown(SIGTERM) : ros::requestShutdown();
   result = ros::xmlrpc::responseInt(1, "", 0);
+}
+
+/** Those who want to stop robots, and the thread that has them do so when a shutdown is requested. */
+class ShutdownWatch
+{
+public:
+  void add(const std::function<void()>& stop)
+  {
+    const std::lock_guard<std::mutex> alone(members_mutex_);
+    const bool first = [&] {
+      const std::lock_guard<std::mutex> lock(mutex_);
+      stops_.push_back(&stop);
+      return stops_.size() == 1;
+    }();
+    if (first)
+    {
+      before_.interrupt = std::signal(SIGINT, requestShutdown);
+      before_.terminate = std::signal(SIGTERM, requestShutdown);
+      detail::deferShutdown();
+      over_ = false;
+      thread_ = std::thread([this] { watch(); });
+    }
+  }
+
+  void remove(const std::function<void()>& stop)
+  {
+    const std::lock_guard<std::mutex> alone(members_mutex_);
+    const bool last = [&] {
+      const std::lock_guard<std::mutex> lock(mutex_);  // not while it is called
+      stops_.erase(std::find(stops_.begin(), stops_.end(), &stop));
+      return stops_.empty();
+    }();
+    if (last)
+    {
+      over_ = true;
+      thread_.join();
+      std::signal(SIGINT, before_.interrupt);
+      std::signal(SIGTERM, before_.terminate);
+      g_is_deferred = false;
+      if (g_shutdown_requested)
+      {
+        ros::requestShutdown();  // it came after the thread's last look
+      }
+    }
+  }
+
+private:
+  void watch()
+  {
+    const ros::WallDuration poll(0.01);
+    while (!over_ && !g_shutdown_requested)
+    {
+      poll.sleep();
+    }
+    if (!g_shutdown_requested)
+    {
+      return;
+    }
+    {
+      const std::lock_guard<std::mutex> lock(mutex_);
+      for (const std::function<void()>* stop : stops_)
+      {
+        guarded("the end", *stop);
+      }
+    }
+    waitForLastCommand();
+    ros::requestShutdown();
+  }
+
+  std::mutex members_mutex_;  // held while one comes or goes; taken before the other one
+  std::mutex mutex_;          // guards stops_
+  std::vector<const std::function<void()>*> stops_;
+  std::atomic<bool> over_{ false };
+  struct
+  {
+    void (*interrupt)(int) = SIG_DFL;
+    void (*terminate)(int) = SIG_DFL;
+  } before_;  // handlers of the signals
+  std::thread thread_;
+};
+
+ShutdownWatch& shutdownWatch()
+{
+  static ShutdownWatch watch;
+  return watch;
 }
 
 }  // namespace
@@ -89,6 +180,7 @@ bool isOutdated(const ServoStatus& last, const CommandGate& gate)
 void detail::deferShutdown()
 {
   g_shutdown_requested = false;
+  g_is_deferred = true;
   std::signal(SIGINT, requestShutdown);
   std::signal(SIGTERM, requestShutdown);
   ros::XMLRPCManager::instance()->unbind("shutdown");
@@ -98,6 +190,21 @@ void detail::deferShutdown()
 bool detail::shutdownRequested()
 {
   return g_shutdown_requested;
+}
+
+void waitForLastCommand()
+{
+  ros::WallDuration(0.1).sleep();
+}
+
+StopBeforeShutdown::StopBeforeShutdown(std::function<void()> stop) : stop_(std::move(stop))
+{
+  shutdownWatch().add(stop_);
+}
+
+StopBeforeShutdown::~StopBeforeShutdown()
+{
+  shutdownWatch().remove(stop_);
 }
 
 }  // namespace view_servo

@@ -16,7 +16,7 @@
 namespace view_servo
 {
 NodeBase::NodeBase(const ros::NodeHandle& nh, const ros::NodeHandle& private_nh)
-  : nh_(nh), private_nh_(private_nh), diagnostics_(nh, private_nh)
+  : nh_(nh), private_nh_(private_nh), diagnostics_(nh, private_nh, private_nh.getNamespace())
 {
   diagnostics_.setHardwareID("none");
   diagnostics_timer_ = every(1.0, "diagnostics", [this] { diagnostics_.force_update(); });

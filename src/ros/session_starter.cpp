@@ -34,9 +34,9 @@ std::vector<Parameter> parameters(SessionStarterParams& params)
   });
 }
 
-SessionStarter::SessionStarter(const SessionStarterParams& params, const FeatureParams& features,
-                               const CameraInput& camera)
-  : params_(params), camera_(camera), views_(ViewStore(viewsDir(params.views_dir)), features)
+SessionStarter::SessionStarter(const ros::NodeHandle& nh, const SessionStarterParams& params,
+                               const FeatureParams& features, const CameraInput& camera)
+  : params_(params), camera_(camera), views_(ViewStore(viewsDir(params.views_dir)), features), transforms_(nh)
 {
 }
 

@@ -17,7 +17,7 @@ std::string withoutSlash(const std::string& frame)
   return frame.substr(!frame.empty() && frame.front() == '/' ? 1 : 0);
 }
 
-TransformSource::TransformSource() : listener_(buffer_)
+TransformSource::TransformSource(const ros::NodeHandle& nh) : listener_(buffer_, nh)
 {
 }
 

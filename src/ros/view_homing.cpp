@@ -39,6 +39,7 @@ ViewHoming::ViewHoming(DriverContext& context, const HomingDriverParams& params,
     images_(context.addInput("image", context.quoted("image_raw"), params.image_timeout)),
     outcomes_(context.addInput("image that was worked on", context.quoted("image_raw"),
                                OUTCOME_PATIENCE * params.image_timeout)),
+    transforms_(context.nodeHandle()),
     odometry_(context, transforms_, base_frame_, params.odometry_timeout, params.odometry_delay,
               [this](const nav_msgs::Odometry& message) { onOdometry(message); }),
     matches_(context.addInput("matches", context.quoted("point_matches") + " or " + context.quoted("line_matches"),
@@ -62,7 +63,7 @@ ViewHoming::ViewHoming(DriverContext& context, const HomingDriverParams& params,
           }
         }),
     camera_(
-        context.nodeHandle(), params.camera,
+        context.nodeHandle(), context.privateNodeHandle(), params.camera,
         [this](const CameraFrame& frame) {
           context_.runLocked("an image on " + images_.topics(), [&] { onFrame(frame); });
         },

@@ -567,7 +567,7 @@ private:
     }
     subscriber.registerCallback(boost::function<void(const CameraImageConstPtr&)>(
         [this, place](const CameraImageConstPtr& image) { takeImage(*image, place); }));
-    subscriber.subscribe(nh, topic, transport, 1);
+    subscriber.subscribe(nh, ros::NodeHandle("~"), topic, transport, 1);
     const std::lock_guard<std::mutex> lock(mutex_);
     (data_.*place).topic = subscriber.getTopic();
   }

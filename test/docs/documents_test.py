@@ -319,6 +319,13 @@ class Documented(unittest.TestCase):
             if self.is_installed(package):
                 self.assertTrue(roslib.packages.find_node(package, program))
             return
+        if package == "nodelet":  # which test/rostest/nodelets_test.py runs
+            self.assertIn("libnodeletlib-tools", self.read("scripts", "install_dependencies"))
+            if arguments[0] == "load":
+                self.assertIn('<class name="%s"' % arguments[1], self.read("nodelets", "view_servo_nodelets.xml"))
+            else:
+                self.assertEqual(arguments[0], "manager")
+            return
         self.assertEqual(package, PACKAGE)
         if program == "check_robot":
             self.try_check_robot(arguments)

@@ -475,7 +475,7 @@ TEST_F(StreamingTest, CalibrationsThatAreHeardAfterAllTheirImagesAreNotMissing)
   std::size_t frames = 0;
   std::vector<std::string> problems;
   const CameraInput input(
-      nh, CameraInputParams(), [&](const CameraFrame&) { ++frames; },
+      nh, ros::NodeHandle("~"), CameraInputParams(), [&](const CameraFrame&) { ++frames; },
       [&](const std::string& problem) { problems.push_back(problem); });
   const Recorder<sensor_msgs::Image> images("busy/image_raw");
   const Recorder<sensor_msgs::CameraInfo> infos("busy/camera_info");

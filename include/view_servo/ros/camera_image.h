@@ -51,10 +51,12 @@ class CameraImageSubscriber : public message_filters::SimpleFilter<CameraImage>
 public:
   /**
    * Calls what is registered for each image from now on.
-   * @param topic of raw images, before remapping. @param transport the default of the private parameter
-   * `image_transport`. @throws std::invalid_argument naming the transports there are, when it is not among them.
+   * @param private_nh whose parameter `image_transport` is used, where there is one, and where transports have parameters
+   * of their own. @param topic of raw images, before remapping. @param transport the default of that parameter.
+   * @throws std::invalid_argument naming the transports there are, when it is not among them.
    */
-  void subscribe(const ros::NodeHandle& nh, const std::string& topic, const std::string& transport, int queue_size);
+  void subscribe(const ros::NodeHandle& nh, const ros::NodeHandle& private_nh, const std::string& topic,
+                 const std::string& transport, int queue_size);
 
   /** Resolved name of the topic that images come on. */
   const std::string& getTopic() const

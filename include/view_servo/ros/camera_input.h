@@ -59,8 +59,8 @@ public:
    * @param on_frame called with every usable frame. @param on_problem called for every other frame, and for images
    * without calibrations, with what is wrong. @throws std::invalid_argument when there is no such transport.
    */
-  CameraInput(const ros::NodeHandle& nh, const CameraInputParams& params, Callback on_frame = Callback(),
-              std::function<void(const std::string&)> on_problem = {});
+  CameraInput(const ros::NodeHandle& nh, const ros::NodeHandle& private_nh, const CameraInputParams& params,
+              Callback on_frame = Callback(), std::function<void(const std::string&)> on_problem = {});
 
   /** @throws ImageError, saying why, when there is no usable frame or it is too old. */
   CameraFrame latest() const;

@@ -12,6 +12,7 @@
 
 #include <atomic>
 #include <cstdint>
+#include <functional>
 #include <string>
 
 namespace view_servo
@@ -108,6 +109,29 @@ void deferShutdown();
 bool shutdownRequested();
 }  // namespace detail
 
+/** Lets the last command leave, which ROS sends by a thread of its own. */
+void waitForLastCommand();
+
+/** Threads that call the callbacks of a node that drives a robot. */
+constexpr std::uint32_t CONTROL_NODE_THREADS = 4;
+
+/**
+ * Has a robot stopped before ROS shuts down in a process that belongs to somebody else. From the first one to the end of the
+ * last, SIGINT, SIGTERM and the master's order to shut down first have `stop` called of all of them, and then shut ROS down.
+ */
+class StopBeforeShutdown
+{
+public:
+  /** @param stop sends zero; called by a thread of its own, at most once, and never after this has ended. */
+  explicit StopBeforeShutdown(std::function<void()> stop);
+  ~StopBeforeShutdown();
+  StopBeforeShutdown(const StopBeforeShutdown&) = delete;
+  StopBeforeShutdown& operator=(const StopBeforeShutdown&) = delete;
+
+private:
+  const std::function<void()> stop_;
+};
+
 /**
  * As runNode(), for a node that drives a robot: its `stop()`, which sends zero, is called before ROS shuts down.
  * @return 1 when the node refuses to start.
@@ -115,9 +139,7 @@ bool shutdownRequested();
 template <typename Node>
 int runControlNode(int argc, char** argv, const std::string& name)
 {
-  constexpr std::uint32_t SPINNER_THREADS = 4;
   const ros::WallDuration poll(0.01);
-  const ros::WallDuration flush(0.1);  // for the last command to leave
   keepFreedMemory();
   const ExitDeadline exit_deadline(&detail::shutdownRequested);
   ros::init(argc, argv, name, ros::init_options::NoSigintHandler);
@@ -126,14 +148,14 @@ int runControlNode(int argc, char** argv, const std::string& name)
   try
   {
     Node node(nh, ros::NodeHandle("~"));
-    ros::AsyncSpinner spinner(SPINNER_THREADS);
+    ros::AsyncSpinner spinner(CONTROL_NODE_THREADS);
     spinner.start();
     while (ros::ok() && !detail::shutdownRequested())
     {
       poll.sleep();
     }
     guarded("the end", [&] { node.stop(); });
-    flush.sleep();
+    waitForLastCommand();
     spinner.stop();
     ros::shutdown();
     return 0;

@@ -171,6 +171,10 @@ public:
   {
     return nh_;
   }
+  const ros::NodeHandle& privateNodeHandle() const
+  {
+    return private_nh_;
+  }
   diagnostic_updater::Updater& diagnostics()
   {
     return diagnostics_;

@@ -203,14 +203,16 @@ private:
   ros::WallTimer diagnostics_timer_;
 };
 
+/** Threads that call a node's callbacks: a few, so that images go on arriving while a service works. */
+constexpr std::uint32_t NODE_THREADS = 3;
+
 /**
- * A node's main(): spins on a few threads, so that images go on arriving while a service works.
+ * A node's main(): spins on NODE_THREADS.
  * @return 1 when the node refuses to start.
  */
 template <typename Node>
 int runNode(int argc, char** argv, const std::string& name)
 {
-  constexpr std::uint32_t SPINNER_THREADS = 3;
   keepFreedMemory();
   ros::init(argc, argv, name);
   const ExitDeadline exit_deadline(&ros::isShuttingDown);
@@ -218,7 +220,7 @@ int runNode(int argc, char** argv, const std::string& name)
   try
   {
     Node node(nh, ros::NodeHandle("~"));
-    ros::MultiThreadedSpinner(SPINNER_THREADS).spin();
+    ros::MultiThreadedSpinner(NODE_THREADS).spin();
     return 0;
   }
   catch (const std::exception& error)

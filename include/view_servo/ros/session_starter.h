@@ -49,8 +49,9 @@ public:
     std::string reason;                     ///< why there is no session; empty when there is
   };
 
-  /** @param features that views are prepared with. @param camera must outlive this. */
-  SessionStarter(const SessionStarterParams& params, const FeatureParams& features, const CameraInput& camera);
+  /** @param nh for tf. @param features that views are prepared with. @param camera must outlive this. */
+  SessionStarter(const ros::NodeHandle& nh, const SessionStarterParams& params, const FeatureParams& features,
+                 const CameraInput& camera);
 
   /** A session for a view, or the reason why there is none. Does not wait for what is missing. */
   Preparation prepare(const std::string& view);

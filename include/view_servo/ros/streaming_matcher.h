@@ -23,8 +23,11 @@
 #include <ros/publisher.h>
 #include <ros/subscriber.h>
 #include <ros/time.h>
+#include <sensor_msgs/Image.h>
 #include <sensor_msgs/image_encodings.h>
 #include <std_msgs/Header.h>
+#include <boost/make_shared.hpp>
+#include <boost/shared_ptr.hpp>
 #include <opencv2/core/mat.hpp>
 #include <opencv2/core/types.hpp>
 
@@ -186,7 +189,7 @@ private:
       rate_(params.node.rate),
       matching_(params.matching),
       features_(matching_.features()),
-      camera_(nh, params.node.camera, [this](const CameraFrame& frame) { onFrame(frame); }),
+      camera_(nh, private_nh, params.node.camera, [this](const CameraFrame& frame) { onFrame(frame); }),
       sources_(params.node.sources, camera_),
       views_(sources_.store(), features_),
       transport_(private_nh)
@@ -367,7 +370,8 @@ private:
       publish(result, label);
       if (wants_overlay)
       {
-        overlay_publisher_.publish(overlay(*reference.image, *current.image, result, label.header));
+        overlay_publisher_.publish(boost::make_shared<const sensor_msgs::Image>(
+            overlay(*reference.image, *current.image, result, label.header)));
       }
       return { false, result.message };
     }
@@ -379,12 +383,12 @@ private:
 
   void publish(const typename Matching::Result& result, const MatchLabel& label)
   {
-    typename Matching::Message message = Matching::toMessage(result, label);
-    message.header = label.header;
-    message.view = label.chosen.view;
-    message.goal = label.chosen.goal;
-    message.refused = label.refused;
-    matches_publisher_.publish(message);
+    const auto message = boost::make_shared<typename Matching::Message>(Matching::toMessage(result, label));
+    message->header = label.header;
+    message->view = label.chosen.view;
+    message->goal = label.chosen.goal;
+    message->refused = label.refused;
+    matches_publisher_.publish(boost::shared_ptr<const typename Matching::Message>(message));
   }
 
   LastResult publishFailure(const MatchLabel& label, const std::string& reason)

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <geometry_msgs/TransformStamped.h>
+#include <ros/node_handle.h>
 #include <ros/time.h>
 #include <tf2_ros/buffer.h>
 #include <tf2_ros/transform_listener.h>
@@ -22,7 +23,8 @@ std::string withoutSlash(const std::string& frame);
 class TransformSource
 {
 public:
-  TransformSource();
+  /** @param nh names `/tf` and `/tf_static`, with its remappings. */
+  explicit TransformSource(const ros::NodeHandle& nh = ros::NodeHandle());
 
   /**
    * Why tf cannot give the transform from `source` to `target` at a time, in one line; empty when it can.
