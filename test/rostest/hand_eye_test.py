@@ -15,7 +15,9 @@ import unittest
 
 ROOT = os.path.realpath(os.path.join(os.path.dirname(os.path.abspath(__file__)), "..", ".."))
 sys.path.insert(0, os.path.join(ROOT, "test", "docs"))
+sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))
 import graph  # noqa: E402
+from arm_poses import looking_at_the_box, matrix_of  # noqa: E402
 
 import genpy.dynamic  # noqa: E402
 import geometry_msgs.msg  # noqa: E402
@@ -40,35 +42,6 @@ POSES = [(0.50, 0.00, 0.74, 0), (0.44, 0.12, 0.80, 15), (0.42, -0.13, 0.82, -20)
          (0.47, -0.12, 0.66, -30), (0.40, 0.02, 0.86, 5), (0.55, -0.06, 0.80, 25), (0.46, 0.14, 0.72, -15),
          (0.40, -0.04, 0.70, 35), (0.52, 0.06, 0.82, -35), (0.44, -0.15, 0.74, 10), (0.56, 0.03, 0.70, -8),
          (0.41, 0.10, 0.68, 20), (0.49, -0.10, 0.84, -10), (0.53, -0.12, 0.70, 18), (0.43, 0.00, 0.78, -28)]
-
-
-def quaternion_of(matrix):
-    """x, y, z, w of a rotation."""
-    values, vectors = numpy.linalg.eigh(numpy.array([
-        [matrix[0, 0] - matrix[1, 1] - matrix[2, 2], 0.0, 0.0, 0.0],
-        [matrix[0, 1] + matrix[1, 0], matrix[1, 1] - matrix[0, 0] - matrix[2, 2], 0.0, 0.0],
-        [matrix[0, 2] + matrix[2, 0], matrix[1, 2] + matrix[2, 1], matrix[2, 2] - matrix[0, 0] - matrix[1, 1], 0.0],
-        [matrix[2, 1] - matrix[1, 2], matrix[0, 2] - matrix[2, 0], matrix[1, 0] - matrix[0, 1], numpy.trace(matrix)]]))
-    return vectors[:, numpy.argmax(values)]
-
-
-def matrix_of(x, y, z, w):
-    return numpy.array([[1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)],
-                        [2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)],
-                        [2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)]])
-
-
-def looking_at_the_box(x, y, z, roll):
-    """The request of set_pose for a pose of POSES."""
-    ahead = numpy.array([0.96, 0.0, 0.74]) - [x, y, z]
-    ahead /= numpy.linalg.norm(ahead)
-    right = numpy.cross(ahead, [0.0, 0.0, 1.0])
-    right /= numpy.linalg.norm(right)
-    level = numpy.column_stack([right, numpy.cross(ahead, right), ahead])
-    c, s = numpy.cos(numpy.radians(roll)), numpy.sin(numpy.radians(roll))
-    turned = level @ numpy.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
-    return "{pose: {position: {x: %g, y: %g, z: %g}, orientation: {x: %.9f, y: %.9f, z: %.9f, w: %.9f}}}" % (
-        x, y, z, *quaternion_of(turned))
 
 
 def degrees_between(a, b):
