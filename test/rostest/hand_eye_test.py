@@ -110,9 +110,15 @@ class HandEye(graph.GraphTest):
 
     def test_calibrates_and_publishes(self):
         poses = list(POSES)
-        process = self.begin("--view box --flange flange --out mounted.yaml")
+        recording = self.graph.start("rosbag", "record", "--output-name=arm.bag", "/tf", "/tf_static",
+                                     "/homography_tracker/homography", "/camera/camera_info")
+        graph.wait_until("the recording", lambda: any(
+            node.startswith("/record") for node in self.graph.state()[1].get("/homography_tracker/homography", [])))
+        process = self.begin("--view box --flange flange --keep poses.yaml --out mounted.yaml")
         text = self.lead(process, poses)
         self.assertEqual(process.returncode, DONE, text)
+        recording.send_signal(signal.SIGINT)
+        recording.wait(20.0)
         with open(os.path.join(self.directory, "mounted.yaml")) as file:
             found = yaml.safe_load(file)
         self.assertEqual(found["parameters"], {
@@ -128,9 +134,44 @@ class HandEye(graph.GraphTest):
         self.assertIn("hand_eye:=mounted.yaml", text)
         self.assertIn("static_transform_publisher %.6f" % place[0], text)
 
+        self.check_offline(numbers, place, rotation)
+
         # A file that exists is kept.
         self.calibrate("--view box --flange flange --out mounted.yaml", CANNOT, "exists: say --overwrite")
         self.check_publishing(found, place, rotation)
+
+    def check_offline(self, numbers, place, rotation):
+        """Without a master, from the poses that were kept, and from the bag."""
+        offline = "ROS_MASTER_URI=http://localhost:1 rosrun view_servo calibrate_hand_eye "
+        status, text = self.graph.run(offline + "--file poses.yaml --out again.yaml")
+        self.assertEqual(status, DONE, text)
+        with open(os.path.join(self.directory, "again.yaml")) as file:
+            again = yaml.safe_load(file)
+        for name, value in numbers.items():
+            self.assertAlmostEqual(again["transformation"][name], value, 6, name)
+        status, text = self.graph.run(offline + "--file arm.bag --view box --flange flange --out by_bag.yaml")
+        self.assertEqual(status, DONE, text)
+        with open(os.path.join(self.directory, "by_bag.yaml")) as file:
+            by_bag = yaml.safe_load(file)
+        self.assertEqual(by_bag["parameters"], again["parameters"])
+        found = by_bag["transformation"]
+        self.assertLess(1e3 * numpy.linalg.norm([found[name] for name in "xyz"] - place), 0.5, text)
+        self.assertLess(degrees_between(matrix_of(*(found["q" + name] for name in "xyzw")), rotation), 0.1, text)
+        # What it may lack.
+        for words, complaint in (
+                ("--file arm.bag", "--view NAME"),
+                ("--file arm.bag --view nothing", "'nothing'"),
+                ("--file arm.bag --view box --flange wrist", "its tf does not know 'wrist' in 'base_link'.*--flange"),
+                ("--file arm.bag --view box --camera nobody", "no camera_info is in it on '/nobody/camera_info'"),
+                ("--file arm.bag --view box --tracker nobody", "no homography of view 'box' is in it on '/nobody/homography'"),
+                ("--file poses.yaml --keep poses.yaml", "'poses.yaml' exists: say --overwrite, or another file by --keep"),
+                ("--file nowhere.bag --view box", "nowhere.bag.*no such file"),
+                ("--file nowhere.yaml", "nowhere.yaml.*no such file"),
+                ("--file mounted.yaml", "has not all of parameters, view and poses"),
+                ("--file text.bag --view box", "text.bag")):
+            with open(os.path.join(self.directory, "text.bag"), "w") as file:
+                file.write("no bag")
+            self.calibrate(words + " --out bad.yaml", CANNOT, complaint)
 
     def check_publishing(self, found, place, rotation):
         # tf has the camera on the flange already.
