@@ -176,6 +176,7 @@ public:
   {
     const std::vector<ServoView> views = viewsOf(goal);
     std::vector<StoredView> stored;
+    stored.reserve(views.size());
     for (const ServoView& view : views)
     {
       stored.push_back(store_.load(view.view));

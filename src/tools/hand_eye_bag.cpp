@@ -13,10 +13,11 @@
 #include <tf2/exceptions.h>
 #include <tf2_msgs/TFMessage.h>
 
+#include <cstddef>
 #include <exception>
 #include <filesystem>
 #include <stdexcept>
-#include <vector>
+#include <string>
 
 namespace view_servo
 {
@@ -44,19 +45,19 @@ void fill(tf2::BufferCore& frames, const rosbag::Bag& bag)
 
 Camera cameraIn(const rosbag::Bag& bag, const std::string& topic)
 {
-  for (const rosbag::MessageInstance& instance : rosbag::View(bag, rosbag::TopicQuery(topic)))
+  rosbag::View messages(bag, rosbag::TopicQuery(topic));
+  const sensor_msgs::CameraInfo::ConstPtr info =
+      messages.size() > 0 ? messages.begin()->instantiate<sensor_msgs::CameraInfo>() : nullptr;
+  if (!info)
   {
-    if (const sensor_msgs::CameraInfo::ConstPtr info = instance.instantiate<sensor_msgs::CameraInfo>())
-    {
-      Camera camera = toCamera(*info);
-      if (const std::string fault = camera.fault(); !fault.empty())
-      {
-        throw std::runtime_error("'" + topic + "': " + fault);
-      }
-      return camera;
-    }
+    throw std::runtime_error("no camera_info is in it on '" + topic + "': record that, too, or say --camera");
   }
-  throw std::runtime_error("no camera_info is in it on '" + topic + "': record that, too, or say --camera");
+  Camera camera = toCamera(*info);
+  if (const std::string fault = camera.fault(); !fault.empty())
+  {
+    throw std::runtime_error("'" + topic + "': " + fault);
+  }
+  return camera;
 }
 
 HandEyePosesFile posesIn(const rosbag::Bag& bag, const HandEyeSources& sources)
