@@ -293,6 +293,7 @@ std::optional<Options> readOptions(int argc, char** argv)
   std::vector<std::string> words;
   ros::removeROSArgs(argc, argv, words);
   std::vector<const char*> pointers;
+  pointers.reserve(words.size());
   for (const std::string& word : words)
   {
     pointers.push_back(word.c_str());
