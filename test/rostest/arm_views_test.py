@@ -20,6 +20,7 @@ import actionlib  # noqa: E402
 import numpy  # noqa: E402
 import rospy  # noqa: E402
 from geometry_msgs.msg import PoseStamped, TwistStamped  # noqa: E402
+from std_msgs.msg import Bool  # noqa: E402
 from view_servo.msg import ServoToViewAction, ServoToViewGoal, ServoView  # noqa: E402
 
 # Of the camera in the world [m], and its turn about its own axis [degrees].
@@ -39,6 +40,7 @@ class ArmViews(graph.GraphTest):
         cls.place, cls.commands, cls.feedback = None, [], []
         cls.subscribers = [rospy.Subscriber("/ground_truth", PoseStamped, cls.take_truth),
                            rospy.Subscriber("/cmd_vel", TwistStamped, cls.take_command)]
+        cls.stop = rospy.Publisher("/stop", Bool, queue_size=1, latch=True)
         cls.graph.start("roslaunch", "view_servo", "puma_sim.launch", "world:=rice")
         cls.graph.start("roslaunch", "view_servo", "arm_servo.launch", "sim:=false")
         cls.client = actionlib.SimpleActionClient("/servo", ServoToViewAction)
@@ -93,6 +95,12 @@ class ArmViews(graph.GraphTest):
         with self.lock:
             self.commands.clear()
             self.feedback.clear()
+
+    def tearDown(self):
+        if self.client.gh is not None and self.client.get_state() in (actionlib.GoalStatus.PENDING, actionlib.GoalStatus.ACTIVE):
+            self.client.cancel_goal()
+            graph.wait_until("the end of what a test has left", lambda: self.client.get_state() not in (
+                actionlib.GoalStatus.PENDING, actionlib.GoalStatus.ACTIVE))
 
     def last(self):
         """The last feedback."""
@@ -173,9 +181,12 @@ class ArmViews(graph.GraphTest):
     def test_ends_where_a_view_has_been_deleted(self):
         self.send("approach", "grasp")
         graph.wait_until("motion", self.moving)
+        self.stop.publish(True)  # so that it is still on its way when the view has gone, however slow this machine is
+        graph.wait_until("the arm to be held", lambda: not self.moving())
         status, text = self.graph.run("rosrun view_servo view delete grasp")
         self.assertEqual(status, 0, text)
         self.assertEqual(self.number(), 1)
+        self.stop.publish(False)
         result = self.end(actionlib.GoalStatus.ABORTED, "view 'grasp', 2 of 2: homographies on '/homography_tracker/homography'")
         self.assertIn("cannot load view 'grasp'", result.message)
         self.assertEqual(result.reached, 1)
