@@ -32,7 +32,7 @@ _view_servo_view()
     list) options+=" --json --names" ;;
     save) options+=" --overwrite --learn --roi --file" ;;
     show) options+=" --out" ;;
-    go) options+=" --timeout --enable --driver" ;;
+    go) options+=" --timeout --enable --driver --approach" ;;
     delete | stop | watch) ;;
     *) return ;;
   esac
@@ -46,7 +46,7 @@ _view_servo_view()
       mapfile -t COMPREPLY < <(compgen -W "homing servo_25d" -- "$current")
       return
       ;;
-    --timeout | --patience | --roi) return ;;
+    --timeout | --patience | --roi | --approach) return ;;
   esac
   if [[ $current == -* ]]; then
     mapfile -t COMPREPLY < <(compgen -W "$options" -- "$current")
@@ -64,10 +64,12 @@ _view_servo_view()
     case ${COMP_WORDS[index]} in
       --file | --out | --driver | --timeout | --patience) index=$((index + 1)) ;;
       --roi) index=$((index + 4)) ;;
+      --approach) index=$((index + 2)) ;;
       -*) ;;
       *) [[ ${COMP_WORDS[index + 1]:-} == := || ${COMP_WORDS[index]} == := || ${COMP_WORDS[index - 1]} == := ]] || count=1 ;;
     esac
   done
+  [[ $command != go ]] || count=0  # of several
   # An existing view is saved to replace it.
   if ((count == 0 && index == COMP_CWORD)) && [[ $command =~ ^(show|delete|go)$ ||
       $command == save && " ${COMP_WORDS[*]} " == *" --overwrite "* ]]; then

@@ -6,20 +6,12 @@
 #include "experiments/input_file.h"
 #include "experiments/parallel.h"
 #include "experiments/statistics.h"
-#include "sim/puma.h"
-#include "sim/renderer.h"
-#include "sim/visibility.h"
 #include "sim/world_reader.h"
 #include "tools/package_folder.h"
-#include "view_servo/control/still_pose.h"
+#include "trials/hand_eye_trial.h"
 #include "view_servo/geometry/hand_eye.h"
 #include "view_servo/geometry/homography.h"
-#include "view_servo/geometry/region.h"
 #include "view_servo/geometry/rotation_vector.h"
-#include "view_servo/robust/random.h"
-#include "view_servo/tracking/plane_finder.h"
-#include "view_servo/tracking/plane_tracker.h"
-#include "view_servo/views/prepared_image.h"
 
 #include <Eigen/Geometry>
 #include <opencv2/calib3d.hpp>
@@ -50,7 +42,6 @@ namespace
 {
 constexpr double DEGREES = 180.0 / M_PI;
 constexpr std::array<const char*, 2> WORLDS = { "rice", "mouse" };
-constexpr int POSES = 12;
 
 double millimetresBetween(const Eigen::Isometry3d& a, const Eigen::Isometry3d& b)
 {
@@ -83,163 +74,6 @@ double largest(const std::vector<double>& values)
 {
   return *std::max_element(values.begin(), values.end());
 }
-
-// --------------------------------------------------------------------------------------------------- simulated arm
-
-/** One calibration of the simulated arm. */
-class Calibration
-{
-public:
-  Calibration(const sim::World& world, const std::string& urdf, std::uint64_t seed)
-    : world_(sim::withImageNoise(world, IMAGE_NOISE)),
-      rng_(seed),
-      camera_(world_, {}, seed),
-      puma_(urdf, pumaParams(seed)),
-      finder_(PointViewMatcherParams())
-  {
-    // What is beside the plane must not touch the corners' surroundings.
-    world_.region = cv::Rect(world_.region.x + MARGIN, world_.region.y + MARGIN, world_.region.width - 2 * MARGIN,
-                             world_.region.height - 2 * MARGIN);
-    const Eigen::Isometry3d mounted(Eigen::Translation3d(0.03, -0.05, 0.07) *
-                                    Eigen::AngleAxisd(1.2, Eigen::Vector3d(1.0, 2.0, -1.0).normalized()));
-    described_camera_in_flange_ = mounted;
-    hold(world_.goal);
-    view_ = std::make_shared<const PreparedImage>(camera_.capture(world_.robot_base * puma_.cameraPose()),
-                                                  world_.region, finder_.features());
-    // The true camera is where the description has it, and then the hand-eye error further.
-    camera_in_flange_ = mounted * puma_.nominalCameraPose(puma_.joints()).inverse() * puma_.cameraPose();
-    const Eigen::Vector3d ray = (world_.camera.k.inverse() * middleOf(world_.region).homogeneous()).normalized();
-    const std::optional<double> distance = sim::firstHit(world_, world_.goal.translation(), world_.goal.linear() * ray);
-    if (!distance)
-    {
-      throw std::runtime_error("the view of world " + world_.name + " shows nothing");
-    }
-    middle_ = world_.goal * Eigen::Vector3d(*distance * ray);
-  }
-
-  HandEyeResult run()
-  {
-    constexpr int MOST_TRIES = 100;
-    HandEyeView view;
-    view.k = world_.camera.k;
-    const auto corners = cornersOf(world_.region);
-    view.corners.assign(corners.begin(), corners.end());
-    std::vector<HandEyePose> poses;
-    for (int i = 0; i < MOST_TRIES && poses.size() < POSES; ++i)
-    {
-      if (const std::optional<HandEyePose> pose = observe(elsewhere()))
-      {
-        poses.push_back(*pose);
-      }
-    }
-    return calibrateHandEye(view, poses);
-  }
-
-  const Eigen::Isometry3d& truth() const
-  {
-    return camera_in_flange_;
-  }
-
-private:
-  static constexpr double IMAGE_NOISE = 2.0;
-  static constexpr int MARGIN = 16;  // of the region from that of the world [px]
-
-  static sim::PumaParams pumaParams(std::uint64_t seed)
-  {
-    sim::PumaParams params;
-    params.encoder_noise = 1e-4;
-    params.hand_eye_translation_error = 0.02;
-    params.hand_eye_rotation_error = 3.0 / DEGREES;
-    params.seed = seed;
-    return params;
-  }
-
-  bool hold(const Eigen::Isometry3d& camera)
-  {
-    return puma_.setCameraPose(world_.robot_base.inverse() * camera);
-  }
-
-  /** A pose from which somebody might look at the view: in a box around the goal, turned about the camera's axis. */
-  Eigen::Isometry3d elsewhere()
-  {
-    constexpr double SIDEWAYS = 0.2;  // [m]
-    constexpr double NEARER = 0.06;   // [m]
-    constexpr double FARTHER = 0.2;   // [m]
-    constexpr double BESIDE = 0.04;   // of the middle of the view, looked at [m]
-    constexpr double ROLL = 0.9;      // [rad]
-    const double x = uniform(rng_, -SIDEWAYS, SIDEWAYS);
-    const double y = uniform(rng_, -SIDEWAYS, SIDEWAYS);
-    const Eigen::Vector3d place = world_.goal * Eigen::Vector3d(x, y, uniform(rng_, -FARTHER, NEARER));
-    const double u = uniform(rng_, -BESIDE, BESIDE);
-    const Eigen::Vector3d at = middle_ + world_.goal.linear() * Eigen::Vector3d(u, uniform(rng_, -BESIDE, BESIDE), 0.0);
-    // Turned like the goal's camera: the shortest rotation from its direction to the new one.
-    const Eigen::Vector3d ahead = (at - place).normalized();
-    const Eigen::Quaterniond turn = Eigen::Quaterniond::FromTwoVectors(world_.goal.linear().col(2), ahead);
-    return Eigen::Translation3d(place) * Eigen::Isometry3d(turn * Eigen::Quaterniond(world_.goal.linear())) *
-           Eigen::AngleAxisd(uniform(rng_, -ROLL, ROLL), Eigen::Vector3d::UnitZ());
-  }
-
-  /** What the arm and the images say at a pose; empty when the arm cannot go there, or the view is not followed there. */
-  std::optional<HandEyePose> observe(const Eigen::Isometry3d& camera)
-  {
-    constexpr int MOST_IMAGES = 15;
-    constexpr double IMAGE_RATE = 10.0;  // [Hz]
-    if (!hold(camera))
-    {
-      return std::nullopt;
-    }
-    const Eigen::Isometry3d place = world_.robot_base * puma_.cameraPose();
-    const PlaneFinder::Answer answer = finder_.find({ view_, camera_.capture(place), std::nullopt });
-    if (!answer.h)
-    {
-      return std::nullopt;
-    }
-    PlaneTracker tracker(view_->grey(), world_.region, world_.camera.k, {});
-    tracker.start(*answer.h, std::nullopt);
-    const auto corners = cornersOf(world_.region);
-    StillPose still;
-    for (int i = 0; i < MOST_IMAGES; ++i)
-    {
-      ArmSample sample;
-      sample.stamp = i / IMAGE_RATE;
-      sample.flange_in_base = puma_.nominalCameraPose(puma_.measuredJoints()) * described_camera_in_flange_.inverse();
-      const PlaneTrack& track = tracker.add(camera_.capture(place), std::nullopt);
-      if (track.state != TrackingState::TRACKING)
-      {
-        still.clear();
-        continue;
-      }
-      Correspondences pairs;
-      for (const Eigen::Vector2d& corner : corners)
-      {
-        sample.seen.push_back(transfer(track.homography.h, corner));
-        pairs.push_back({ corner, Eigen::Vector2d::Zero() });
-      }
-      if (const std::optional<ArmSample> mean = still.add(sample))
-      {
-        for (std::size_t k = 0; k < pairs.size(); ++k)
-        {
-          pairs[k].current = mean->seen[k];
-        }
-        if (const std::optional<Eigen::Matrix3d> h = homographyFromPoints(pairs))
-        {
-          return HandEyePose{ mean->flange_in_base, *h };
-        }
-      }
-    }
-    return std::nullopt;
-  }
-
-  sim::World world_;
-  Rng rng_;
-  sim::SimulatedCamera camera_;
-  sim::Puma puma_;
-  PlaneFinder finder_;
-  std::shared_ptr<const PreparedImage> view_;
-  Eigen::Isometry3d described_camera_in_flange_;
-  Eigen::Isometry3d camera_in_flange_;
-  Eigen::Vector3d middle_;  // of the view, in the world [m]
-};
 
 // -------------------------------------------------------------------------------------------------------- real arm
 
@@ -397,7 +231,9 @@ void runHandEyeExperiment(const ExperimentContext& context, std::ostream& csv)
   std::mutex mutex;
   inParallel(lines.size(), context.threads, [&](std::size_t i) {
     const std::string world = WORLDS[i / runs];
-    Calibration calibration(worlds.at(world), urdf, context.seedOf(HAND_EYE_RUNS, i % runs + 1));
+    sim::HandEyeTrialParams params;
+    params.seed = context.seedOf(HAND_EYE_RUNS, i % runs + 1);
+    sim::HandEyeTrial calibration(worlds.at(world), urdf, params);
     const HandEyeResult result = calibration.run();
     const double millimetres = millimetresBetween(result.camera_in_flange, calibration.truth());
     const double degrees = degreesBetween(result.camera_in_flange, calibration.truth());

@@ -1,5 +1,6 @@
 // Copyright (c) 2026, the view_servo authors
 // SPDX-License-Identifier: BSD-3-Clause
+#include "sim/visibility.h"
 #include "sim_ros/simulated_run.h"
 #include "view_servo/ServoToViewAction.h"
 
@@ -11,6 +12,9 @@ namespace view_servo
 {
 namespace
 {
+constexpr double APPROACH_TRANSLATION = 0.01;  // of being at the approach view [m]
+constexpr double APPROACH_ROTATION = 0.03;     // likewise [rad]
+
 RunOutcome run(ros::NodeHandle& nh, const sim::World& world, const RunParams& params)
 {
   SimulatedRun<ServoToViewAction> simulation(nh, params, "puma_sim", "servo_25d", "servo");
@@ -18,9 +22,23 @@ RunOutcome run(ros::NodeHandle& nh, const sim::World& world, const RunParams& pa
   const Eigen::Isometry3d start = world.start(params.start);
   const Eigen::Isometry3d goal = simulation.moveTo(world.goal, world.goal);
   simulation.save(params.view, world.region);
-  simulation.moveTo(start, start);
   ServoToViewGoal order;
-  order.view = params.view;
+  if (params.approach.empty())
+  {
+    order.view = params.view;
+  }
+  else
+  {
+    const Eigen::Isometry3d& approach = world.start(params.approach);
+    simulation.moveTo(approach, approach);
+    order.views.resize(2);
+    order.views.front().view = params.view + "_approach";
+    order.views.front().translation_tolerance = APPROACH_TRANSLATION;
+    order.views.front().rotation_tolerance = APPROACH_ROTATION;
+    order.views.back().view = params.view;
+    simulation.save(order.views.front().view, sim::regionSeenFrom(world, approach));
+  }
+  simulation.moveTo(start, start);
   order.timeout = params.timeout;
   const ServoToViewResult result = simulation.drive(order);
   const Eigen::Isometry3d off = goal.inverse() * simulation.rest();
@@ -37,7 +55,7 @@ RunOutcome run(ros::NodeHandle& nh, const sim::World& world, const RunParams& pa
 
 /**
  * Runs 2.5D servoing once in simulation, and says how far off the camera ends. Parameters: see runSimulation(); `~start` is
- * one of the world's starts.
+ * one of the world's starts. With `~approach` the goal is a list of two views.
  */
 int main(int argc, char** argv)
 {

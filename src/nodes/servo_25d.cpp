@@ -7,8 +7,6 @@
 #include "view_servo/ServoToViewAction.h"
 #include "view_servo/control/joint_guard.h"
 #include "view_servo/control/servo_25d.h"
-#include "view_servo/geometry/camera_warp.h"
-#include "view_servo/geometry/region.h"
 #include "view_servo/parameters/error_text.h"
 #include "view_servo/ros/arm_conversions.h"
 #include "view_servo/ros/conversions.h"
@@ -27,12 +25,15 @@
 
 #include <chrono>
 #include <cmath>
+#include <cstddef>
+#include <initializer_list>
 #include <limits>
 #include <memory>
 #include <optional>
 #include <stdexcept>
 #include <string>
 #include <utility>
+#include <vector>
 
 namespace view_servo
 {
@@ -40,28 +41,87 @@ namespace
 {
 constexpr double NOT_A_NUMBER = std::numeric_limits<double>::quiet_NaN();
 
+/** One of a goal's views. */
+struct ServoStage
+{
+  std::string view;
+  ServoTarget target;
+  std::unique_ptr<Servo25d> servo;
+};
+
 /** A goal that is ready, then on its way. */
 struct ServoTask
 {
-  ServoTask(sensor_msgs::CameraInfo::ConstPtr camera_info, const ServoTarget& servo_target,
-            const Servo25dParams& params)
-    : info(std::move(camera_info)), target(servo_target), servo(target, params)
-  {
-  }
-
-  std::string view;
   sensor_msgs::CameraInfo::ConstPtr info;
-  ServoTarget target;
-  Servo25d servo;
+  std::vector<ServoStage> stages;  ///< at least one
+  std::size_t at = 0;              ///< the stage that the camera is brought to
+  int iterations = 0;
+  bool unanswered = false;  ///< a homography came, and no command has been sent since
+  bool moves = false;       ///< by the last command
+  std::string failure;      ///< why it cannot go on
+
+  // Of the stage.
   std::chrono::steady_clock::time_point start;
   bool distance_known = false;                   ///< by the tracker
   bool found = false;                            ///< a valid homography has come
   std::string acquiring = "looks for the view";  ///< why there was none yet
-  std::string failure;                           ///< why it cannot go on
-  bool unanswered = false;                       ///< a homography came, and no command has been sent since
-  bool moves = false;                            ///< by the last command
-  int iterations = 0;
+
+  const ServoStage& stage() const
+  {
+    return stages[at];
+  }
+  Servo25d& servo() const
+  {
+    return *stage().servo;
+  }
+  bool atLast() const
+  {
+    return at + 1 == stages.size();
+  }
+  /** Which of several views this is about, to begin a line with; empty when there is one only. */
+  std::string where() const
+  {
+    return stages.size() == 1 ? ""
+                              : "view '" + stage().view + "', " + std::to_string(at + 1) + " of " +
+                                    std::to_string(stages.size()) + ": ";
+  }
 };
+
+/** The goal's views as a list, with its tolerances where a view has none. @throws std::invalid_argument. */
+std::vector<ServoView> viewsOf(const ServoToViewGoal& goal)
+{
+  if (!goal.views.empty() && !goal.view.empty())
+  {
+    throw std::invalid_argument("the goal has both a view and a list of views: leave one of them empty");
+  }
+  std::vector<ServoView> views = goal.views;
+  if (views.empty())
+  {
+    views.emplace_back();
+    views.back().view = goal.view;
+  }
+  const auto check = [](std::initializer_list<double> numbers) {
+    for (const double number : numbers)
+    {
+      if (!(number >= 0.0 && std::isfinite(number)))
+      {
+        throw std::invalid_argument("tolerances, dwell and timeout must be finite and not negative");
+      }
+    }
+  };
+  const auto complete = [](double& value, double of_goal) {
+    value = value > 0.0 ? value : of_goal;
+  };
+  check({ goal.translation_tolerance, goal.rotation_tolerance, goal.dwell, goal.timeout });
+  for (ServoView& view : views)
+  {
+    check({ view.translation_tolerance, view.rotation_tolerance, view.dwell });
+    complete(view.translation_tolerance, goal.translation_tolerance);
+    complete(view.rotation_tolerance, goal.rotation_tolerance);
+    complete(view.dwell, goal.dwell);
+  }
+  return views;
+}
 
 }  // namespace
 
@@ -80,7 +140,8 @@ struct ServoTask
  *    after each end, then nothing;
  *  - `servo_error` (view_servo/ServoError): after each homography, for plots.
  *
- * Action: `servo` (view_servo/ServoToView). The chosen point is the middle of the view's region.
+ * Action: `servo` (view_servo/ServoToView). The chosen point is the middle of the view's region. All views of a goal are read
+ * before anything moves. Between two of them the camera stands until the tracker has found the next one.
  */
 class ServoDriver
 {
@@ -116,46 +177,32 @@ public:
 
   std::unique_ptr<Task> prepare(const ServoToViewGoal& goal)
   {
-    for (const double value : { goal.translation_tolerance, goal.rotation_tolerance, goal.dwell, goal.timeout })
+    const std::vector<ServoView> views = viewsOf(goal);
+    std::vector<StoredView> stored;
+    stored.reserve(views.size());
+    for (const ServoView& view : views)
     {
-      if (!(value >= 0.0 && std::isfinite(value)))
-      {
-        throw std::invalid_argument("tolerances, dwell and timeout must be finite and not negative");
-      }
+      stored.push_back(store_.load(view.view));
     }
-    const StoredView stored = store_.load(goal.view);
-    context_.locked([&] { answer_.want(stored.name, context_.goalId()); });
-    context_.requestView(stored.name);
+    context_.locked([&] { answer_.want(stored.front().name, context_.goalId()); });
+    context_.requestView(stored.front().name);
     // Only one that has come since: the camera may be another than it was.
     context_.locked([this] { info_.reset(); });
-    sensor_msgs::CameraInfo::ConstPtr info;
+    auto task = std::make_unique<Task>();
     context_.waitFor([&] {
-      info = context_.locked([this] { return info_; });
-      return info ? "" : "no camera_info has come on " + context_.quoted("camera_info");
+      task->info = context_.locked([this] { return info_; });
+      return task->info ? "" : "no camera_info has come on " + context_.quoted("camera_info");
     });
-    const Camera camera = toCamera(*info);
+    const Camera camera = toCamera(*task->info);
     const std::string fault = faultOf(camera);
     if (!fault.empty())
     {
       throw std::runtime_error(fault);
     }
-    const CameraWarp warp(cameraOf(stored, camera), camera.rectified());
-    const cv::Size size = warp.size();
-    const cv::Rect region = stored.region.empty() ? cv::Rect(cv::Point(), stored.image.size()) : stored.region;
-    const Eigen::Vector2d middle = warp.point(middleOf(region));
-    if (!middle.allFinite())
+    for (std::size_t i = 0; i < views.size(); ++i)
     {
-      throw std::runtime_error("this camera cannot show the middle of the region of view '" + stored.name + "'");
+      task->stages.push_back(makeStage(stored[i], camera, views[i]));
     }
-    Servo25dParams params = params_.servo;
-    const auto set = [](double wanted, double& value) {
-      value = wanted > 0.0 ? wanted : value;
-    };
-    set(goal.translation_tolerance, params.translation_tolerance);
-    set(goal.rotation_tolerance, params.rotation_tolerance);
-    set(goal.dwell, params.dwell);
-    auto task = std::make_unique<Task>(info, ServoTarget{ warp.to().k, { size.width, size.height }, middle }, params);
-    task->view = stored.name;
     context_.waitFor([this] { return context_.locked([this] { return missingAnswer({ &answer_ }); }); });
     return task;
   }
@@ -164,6 +211,7 @@ public:
   {
     task_ = std::move(task);
     task_->start = Clock::now();
+    homographies_.setNeeded(true);
     camera_frame_ = withoutSlash(info_->header.frame_id);
     joints_.clearStuck();
     joint_states_.setNeeded(joint_states_.fresh());
@@ -185,24 +233,15 @@ public:
 
   Progress progress() const
   {
-    if (!task_->failure.empty())
-    {
-      return { Progress::FAILED, task_->failure };
-    }
-    if (!task_->found)
-    {
-      const bool late = std::chrono::duration<double>(Clock::now() - task_->start).count() > params_.acquire_timeout;
-      return late ? Progress{ Progress::FAILED, "the view is not found within " + seconds(params_.acquire_timeout) +
-                                                    ": " + task_->acquiring }
-                  : Progress{ Progress::ACQUIRING, task_->acquiring };
-    }
-    return toProgress(task_->servo.report());
+    Progress progress = progressOfStage();
+    progress.reason = task_->where() + progress.reason;
+    return progress;
   }
 
   Velocity wanted(double time)
   {
     ++task_->iterations;
-    Velocity twist = task_->servo.command(time);
+    Velocity twist = task_->servo().command(time);
     task_->moves = !twist.isZero();
     if (!task_->moves)
     {
@@ -215,7 +254,7 @@ public:
 
   void sent(double time, const Velocity& twist)
   {
-    task_->servo.sent(time, twist);
+    task_->servo().sent(time, twist);
   }
 
   void onMissingInput(double time, const std::string& why)
@@ -223,7 +262,7 @@ public:
     joints_.clearStuck();
     if (task_->found)
     {
-      task_->servo.addLoss(time, why);
+      task_->servo().addLoss(time, why);
     }
   }
 
@@ -258,7 +297,7 @@ public:
   {
     if (task_)
     {
-      const ServoReport& report = task_->servo.report();
+      const ServoReport& report = task_->servo().report();
       status.translation_error = task_->distance_known ? report.translation_error : NOT_A_NUMBER;
       status.rotation_error = report.rotation_error;
       status.point_error = report.point_error;
@@ -268,17 +307,25 @@ public:
 
   void fill(ServoToViewResult& result) const
   {
-    result.iterations = task_ ? task_->iterations : 0;
+    if (task_)
+    {
+      const bool there = task_->servo().report().state == ServoState::CONVERGED;
+      result.iterations = task_->iterations;
+      result.reached = static_cast<int>(task_->at) + (there ? 1 : 0);
+    }
   }
 
-  static void fill(ServoToViewFeedback& feedback, const ServoStatus& status)
+  void fill(ServoToViewFeedback& feedback, const ServoStatus& status) const
   {
     feedback.status = status;
+    feedback.view = task_->stage().view;
+    feedback.number = static_cast<int>(task_->at) + 1;
+    feedback.count = static_cast<int>(task_->stages.size());
   }
 
   void diagnose(diagnostic_updater::DiagnosticStatusWrapper& status) const
   {
-    status.add("View", task_ ? task_->view : answer_.view());
+    status.add("View", answer_.view());
     status.add("Joint limits are watched", joint_states_.fresh());
   }
 
@@ -295,6 +342,57 @@ private:
   {
     const std::string fault = camera.fault();
     return fault.empty() ? "" : fault + ", in " + context_.quoted("camera_info");
+  }
+
+  ServoStage makeStage(const StoredView& stored, const Camera& camera, const ServoView& wanted) const
+  {
+    Servo25dParams params = params_.servo;
+    const auto set = [](double value, double& param) {
+      param = value > 0.0 ? value : param;
+    };
+    set(wanted.translation_tolerance, params.translation_tolerance);
+    set(wanted.rotation_tolerance, params.rotation_tolerance);
+    set(wanted.dwell, params.dwell);
+    const ServoTarget target = servoTargetOf(stored, camera);
+    try
+    {
+      return { stored.name, target, std::make_unique<Servo25d>(target, params) };
+    }
+    catch (const std::invalid_argument& error)
+    {
+      throw std::invalid_argument("view '" + stored.name + "': " + error.what());
+    }
+  }
+
+  Progress progressOfStage() const
+  {
+    if (!task_->failure.empty())
+    {
+      return { Progress::FAILED, task_->failure };
+    }
+    if (task_->found)
+    {
+      return toProgress(task_->servo().report());
+    }
+    const std::string acquiring = answer_.came() ? task_->acquiring : answer_.missing();
+    const bool late = std::chrono::duration<double>(Clock::now() - task_->start).count() > params_.acquire_timeout;
+    return late ? Progress{ Progress::FAILED,
+                            "the view is not found within " + seconds(params_.acquire_timeout) + ": " + acquiring }
+                : Progress{ Progress::ACQUIRING, acquiring };
+  }
+
+  /** The camera is at a view that is not the last: the next one is wanted. It stands until the tracker answers. */
+  void goOn()
+  {
+    ROS_INFO_STREAM(task_->where() << task_->servo().report().reason);
+    ++task_->at;
+    task_->start = Clock::now();
+    task_->distance_known = task_->found = task_->moves = false;
+    task_->acquiring = "looks for the view";
+    joints_.clearStuck();
+    answer_.want(task_->stage().view, context_.goalId());
+    context_.requestNextView(task_->stage().view);
+    homographies_.setNeeded(false);
   }
 
   // ------------------------------------------------------------------------------------------------------- inputs
@@ -321,18 +419,26 @@ private:
 
   void onHomography(const Homography& message)
   {
+    const bool first = !answer_.came();
     if (!answer_.add(message))
     {
+      // Of the view before, until the tracker has turned to the next one.
+      const bool still = task_ && task_->at > 0 && first && message.view == task_->stages[task_->at - 1].view;
       const std::string& problem = answer_.refusal().empty() ? answer_.otherView() : answer_.refusal();
-      if (task_ && !problem.empty())
+      if (task_ && !problem.empty() && !still)
       {
-        context_.abort(problem);
+        context_.abort(task_->where() + problem);
       }
       return;
     }
     if (!task_)
     {
       return;
+    }
+    if (first)
+    {
+      homographies_.setNeeded(true);
+      homographies_.restart();
     }
     const std::string topic = "homographies on " + context_.quoted("homography");
     const DriverInput::Stamp stamp = homographies_.checkStamp(message.header.stamp);
@@ -355,10 +461,15 @@ private:
     homographies_.accept();
     task_->unanswered = true;
     last_age_ = age;
-    ServoError error = toServoError(task_->servo.report(), task_->target, task_->distance_known, message.header);
-    error.view = task_->view;
+    ServoError error =
+        toServoError(task_->servo().report(), task_->stage().target, task_->distance_known, message.header);
+    error.view = task_->stage().view;
     error.twist = last_twist_;
     error_publisher_.publish(error);
+    if (task_->servo().report().state == ServoState::CONVERGED && !task_->atLast())
+    {
+      goOn();
+    }
   }
 
   /** Takes a homography of the view. @return why it cannot be used; empty: it can. */
@@ -373,7 +484,7 @@ private:
       const std::string reason = message.reason.empty() ? "the view is not in the image" : message.reason;
       if (task_->found)
       {
-        task_->servo.addLoss(message.header.stamp.toSec(), reason);
+        task_->servo().addLoss(message.header.stamp.toSec(), reason);
       }
       task_->acquiring = reason;
       return "";
@@ -386,7 +497,7 @@ private:
     try
     {
       const PlaneView view = toPlaneView(message);
-      task_->servo.add(view);
+      task_->servo().add(view);
       task_->distance_known = task_->distance_known || view.distance;
       task_->found = true;
       return "";

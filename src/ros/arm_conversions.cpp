@@ -3,6 +3,8 @@
 #include "view_servo/ros/arm_conversions.h"
 
 #include "view_servo/ServoStatus.h"
+#include "view_servo/geometry/camera_warp.h"
+#include "view_servo/geometry/region.h"
 #include "view_servo/ros/conversions.h"
 
 #include <ros/console.h>
@@ -38,6 +40,18 @@ std::uint8_t toStatusState(ServoState state)
 }
 
 }  // namespace
+
+ServoTarget servoTargetOf(const StoredView& view, const Camera& camera)
+{
+  const CameraWarp warp(cameraOf(view, camera), camera.rectified());
+  const cv::Rect region = view.region.empty() ? cv::Rect(cv::Point(), view.image.size()) : view.region;
+  const Eigen::Vector2d middle = warp.point(middleOf(region));
+  if (!middle.allFinite())
+  {
+    throw std::runtime_error("this camera cannot show the middle of the region of view '" + view.name + "'");
+  }
+  return { warp.to().k, { warp.size().width, warp.size().height }, middle };
+}
 
 PlaneView toPlaneView(const Homography& message)
 {

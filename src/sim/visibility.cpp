@@ -2,6 +2,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "sim/visibility.h"
 
+#include "view_servo/geometry/region.h"
+
 #include <cmath>
 
 namespace view_servo::sim
@@ -63,6 +65,32 @@ double shareInSight(const World& world, const Eigen::Isometry3d& reference, cons
     }
   }
   return seen > 0 ? static_cast<double>(seen_again) / seen : 0.0;
+}
+
+cv::Rect regionSeenFrom(const World& world, const Eigen::Isometry3d& camera)
+{
+  const cv::Rect image(0, 0, world.camera.width, world.camera.height);
+  if (world.region.empty())
+  {
+    return image;
+  }
+  Eigen::AlignedBox2d box;
+  for (const Eigen::Vector2d& corner : cornersOf(world.region))
+  {
+    const Eigen::Vector3d direction = world.goal.linear() * world.camera.normalized(corner).homogeneous().normalized();
+    const std::optional<double> distance = firstHit(world, world.goal.translation(), direction);
+    const Eigen::Vector3d point = world.goal.translation() + distance.value_or(0.0) * direction;
+    const Eigen::Vector3d there = camera.inverse() * point;
+    if (!distance || !(there.z() > 0.0))
+    {
+      return {};
+    }
+    box.extend(world.camera.project(there));
+  }
+  const auto pixel = [](const Eigen::Vector2d& point) {
+    return cv::Point(static_cast<int>(std::lround(point.x())), static_cast<int>(std::lround(point.y())));
+  };
+  return cv::Rect(pixel(box.min()), pixel(box.max()) + cv::Point(1, 1)) & image;
 }
 
 }  // namespace view_servo::sim

@@ -6,6 +6,7 @@
 
 #include <Eigen/Core>
 #include <Eigen/Geometry>
+#include <opencv2/core/types.hpp>
 
 #include <optional>
 
@@ -27,5 +28,12 @@ std::optional<double> firstHit(const World& world, const Eigen::Vector3d& origin
  * @param current world from optical frame.
  */
 double shareInSight(const World& world, const Eigen::Isometry3d& reference, const Eigen::Isometry3d& current);
+
+/**
+ * The rectangle around what the world's region, as seen from its goal, is in an image from elsewhere [px], within that image;
+ * empty when nothing of it is there. Of a world without a region, that is the whole image.
+ * @param camera world from optical frame.
+ */
+cv::Rect regionSeenFrom(const World& world, const Eigen::Isometry3d& camera);
 
 }  // namespace view_servo::sim

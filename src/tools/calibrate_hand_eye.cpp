@@ -1,6 +1,7 @@
 // Copyright (c) 2026, the view_servo authors
 // SPDX-License-Identifier: BSD-3-Clause
 #include "tools/command_line.h"
+#include "tools/hand_eye_bag.h"
 #include "tools/hand_eye_session.h"
 #include "view_servo/geometry/hand_eye.h"
 #include "view_servo/parameters/error_text.h"
@@ -43,6 +44,8 @@ struct Options
   HandEyeSources sources{ "", "", "base_link", "tool0", "camera", "homography_tracker" };
   int poses = 12;
   std::optional<double> distance;  // of the plane from the view's camera [m]
+  std::string file;                // with what was recorded before; empty: the arm is there
+  std::string keep;                // file for the poses; empty: none
   std::string out = "hand_eye.yaml";
   bool overwrite = false;
 };
@@ -87,8 +90,39 @@ std::string advice(const HandEyeSession& session, const HandEyeParams& params)
              : "move the arm to another pose, with the view in the picture, and let it stand for a second";
 }
 
+/** Of today, with the time. */
+std::string date()
+{
+  const std::time_t now = std::time(nullptr);
+  char text[32];
+  std::strftime(text, sizeof text, "%Y-%m-%d %H:%M", std::localtime(&now));
+  return text;
+}
+
+HandEyePosesFile posesOf(const HandEyeSession& session, const HandEyeSources& sources)
+{
+  HandEyePosesFile poses;
+  poses.base_frame = sources.base_frame;
+  poses.flange_frame = sources.flange_frame;
+  poses.camera_frame = session.cameraFrame();
+  poses.view_name = sources.view;
+  poses.view = session.view();
+  poses.poses = session.poses();
+  return poses;
+}
+
+void keepPoses(HandEyePosesFile poses, const Options& options)
+{
+  if (!options.keep.empty())
+  {
+    poses.comment = "calibrate_hand_eye, " + date() + ": poses for its option --file";
+    writeHandEyePosesFile(poses, options.keep);
+    std::cout << poses.poses.size() << " poses are kept in " << options.keep << std::endl;
+  }
+}
+
 /** Says what came of it, and writes the file. @return the exit status. */
-int finish(const HandEyeSession& session, const HandEyeResult& result, const Options& options)
+int finish(const HandEyePosesFile& poses, const HandEyeResult& result, const Options& options)
 {
   for (std::size_t i = 0; i < result.residuals.size() && usedOf(result) > 0; ++i)
   {
@@ -102,9 +136,9 @@ int finish(const HandEyeSession& session, const HandEyeResult& result, const Opt
     return NOT_DONE;
   }
   HandEyeFile file;
-  file.base_frame = options.sources.base_frame;
-  file.flange_frame = options.sources.flange_frame;
-  file.camera_frame = session.cameraFrame();
+  file.base_frame = poses.base_frame;
+  file.flange_frame = poses.flange_frame;
+  file.camera_frame = poses.camera_frame;
   file.camera_in_flange = result.camera_in_flange;
   for (int row = 0; row < 6; ++row)
   {
@@ -113,11 +147,8 @@ int finish(const HandEyeSession& session, const HandEyeResult& result, const Opt
       file.covariance.push_back(result.covariance(row, column));
     }
   }
-  const std::time_t now = std::time(nullptr);
-  char date[32];
-  std::strftime(date, sizeof date, "%Y-%m-%d %H:%M", std::localtime(&now));
-  file.comment = "calibrate_hand_eye, " + std::string(date) + ": view " + options.sources.view + ", " +
-                 std::to_string(usedOf(result)) + " of " + std::to_string(result.residuals.size()) + " poses";
+  file.comment = "calibrate_hand_eye, " + date() + ": view " + poses.view_name + ", " + std::to_string(usedOf(result)) +
+                 " of " + std::to_string(result.residuals.size()) + " poses";
   writeHandEyeFile(file, options.out);
 
   const Eigen::Vector3d place = result.camera_in_flange.translation();
@@ -141,7 +172,18 @@ int finish(const HandEyeSession& session, const HandEyeResult& result, const Opt
   return DONE;
 }
 
-int run(const Options& options)
+/** Of what was recorded before. @return the exit status. */
+int runOffline(const Options& options, const HandEyeParams& params)
+{
+  const bool bag = std::filesystem::path(options.file).extension() == ".bag";
+  const HandEyePosesFile poses =
+      bag ? readHandEyeBag(options.file, options.sources) : readHandEyePosesFile(options.file);
+  std::cout << poses.poses.size() << " poses before view '" << poses.view_name << "' in " << options.file << std::endl;
+  keepPoses(poses, options);
+  return finish(poses, calibrateHandEye(poses.view, poses.poses, params), options);
+}
+
+int run(const Options& options, const HandEyeParams& params)
 {
   constexpr std::chrono::milliseconds POLL{ 20 };
   constexpr std::chrono::seconds REMINDER{ 5 };
@@ -157,14 +199,20 @@ int run(const Options& options)
   ros::AsyncSpinner spinner(THREADS);
   spinner.start();
   HandEyeSession session(nh, options.sources, &detail::shutdownRequested);
-  HandEyeParams params;
-  params.distance = options.distance.value_or(params.distance);
   std::cout
       << "view '" << options.sources.view << "': bring the arm to " << options.poses
       << " poses from which the camera sees it, turned about at least two axes, nearer and farther away, and let it "
          "stand for a second at each; Ctrl-C ends it with what there is"
       << std::endl;
 
+  const auto end = [&](const HandEyeResult& found) {
+    const HandEyePosesFile poses = posesOf(session, options.sources);
+    if (!poses.poses.empty())
+    {
+      keepPoses(poses, options);
+    }
+    return finish(poses, found, options);
+  };
   HandEyeResult result;
   Clock::time_point reminded = Clock::now();
   std::string said;
@@ -181,7 +229,7 @@ int run(const Options& options)
         if (result.found && used >= options.poses)
         {
           std::cout << "that is enough" << std::endl;
-          return finish(session, result, options);
+          return end(result);
         }
         if (used > 0 && !result.residuals.back().used)
         {
@@ -190,7 +238,7 @@ int run(const Options& options)
         if (count >= options.poses + MOST_MORE)
         {
           std::cout << "it is of no use to go on" << std::endl;
-          return finish(session, result, options);
+          return end(result);
         }
       }
       std::cout << advice(session, params) << std::endl;
@@ -207,7 +255,7 @@ int run(const Options& options)
     std::this_thread::sleep_for(POLL);
   }
   result = calibrateHandEye(session.view(), session.poses(), params);
-  return finish(session, result, options);
+  return end(result);
 }
 
 std::optional<Options> readOptions(int argc, char** argv)
@@ -217,7 +265,8 @@ std::optional<Options> readOptions(int argc, char** argv)
       "Finds out where a camera is mounted on an arm's flange: somebody brings the arm to some poses from which\n"
       "homography_tracker follows a stored view of a plane.\n"
       "\n"
-      "  rosrun view_servo calibrate_hand_eye --view NAME [OPTIONS]",
+      "  rosrun view_servo calibrate_hand_eye --view NAME [OPTIONS]\n"
+      "  rosrun view_servo calibrate_hand_eye --file FILE [OPTIONS]",
       "Example: rosrun view_servo calibrate_hand_eye --view shelf --base base_link --flange tool0 --camera /camera\n"
       "Exit status: 0 calibrated, 1 too little motion or poses that contradict one another, 2 cannot, with one line "
       "on\n"
@@ -234,11 +283,17 @@ std::optional<Options> readOptions(int argc, char** argv)
   line.number("distance", options.distance, { 0.01, 100.0 },
               "of the plane from the camera where the view was stored, measured square to the plane [m]; without, it "
               "follows from the arm's motion");
+  line.text("file", options.file,
+            "calibrates from what was recorded before: a file of --keep, or a bag (.bag) with tf, camera_info and the "
+            "tracker's "
+            "homographies, for which --view, --base, --flange, --camera and --tracker count");
+  line.text("keep", options.keep, "file to write the poses to, for --file");
   line.text("out", options.out, "file to write");
-  line.flag("overwrite", options.overwrite, "replace that file when it exists");
+  line.flag("overwrite", options.overwrite, "replace files that exist");
   std::vector<std::string> words;
   ros::removeROSArgs(argc, argv, words);
   std::vector<const char*> pointers;
+  pointers.reserve(words.size());
   for (const std::string& word : words)
   {
     pointers.push_back(word.c_str());
@@ -252,7 +307,8 @@ std::optional<Options> readOptions(int argc, char** argv)
   {
     throw std::runtime_error("'" + rest->front() + "' is not understood: see --help");
   }
-  if (sources.view.empty())
+  const bool poses_file = !options.file.empty() && std::filesystem::path(options.file).extension() != ".bag";
+  if (sources.view.empty() && !poses_file)
   {
     throw std::runtime_error("say which stored view: --view NAME");
   }
@@ -260,6 +316,10 @@ std::optional<Options> readOptions(int argc, char** argv)
   if (!options.overwrite && std::filesystem::exists(options.out))
   {
     throw std::runtime_error("'" + options.out + "' exists: say --overwrite, or another file by --out");
+  }
+  if (!options.overwrite && !options.keep.empty() && std::filesystem::exists(options.keep))
+  {
+    throw std::runtime_error("'" + options.keep + "' exists: say --overwrite, or another file by --keep");
   }
   return options;
 }
@@ -277,11 +337,17 @@ int main(int argc, char** argv)
     {
       return DONE;
     }
+    HandEyeParams params;
+    params.distance = options->distance.value_or(params.distance);
+    if (!options->file.empty())
+    {
+      return runOffline(*options, params);
+    }
     ros::init(argc, argv, "calibrate_hand_eye", ros::init_options::NoSigintHandler | ros::init_options::AnonymousName);
     ros::console::set_logger_level(ROSCONSOLE_DEFAULT_NAME, ros::console::levels::Fatal);
     ros::console::notifyLoggerLevelsChanged();
     const ExitDeadline exit_deadline(&detail::shutdownRequested);
-    return run(*options);
+    return run(*options, params);
   }
   catch (const std::exception& error)
   {

@@ -3,10 +3,6 @@
 #include "tools/hand_eye_session.h"
 
 #include "view_servo/SetView.h"
-#include "view_servo/geometry/camera_warp.h"
-#include "view_servo/geometry/homography.h"
-#include "view_servo/geometry/region.h"
-#include "view_servo/geometry/rotation_vector.h"
 #include "view_servo/ros/call_service.h"
 #include "view_servo/ros/conversions.h"
 #include "view_servo/ros/image_source.h"
@@ -22,26 +18,6 @@ namespace view_servo
 namespace
 {
 constexpr double PATIENCE = 5.0;  // until what is needed is there [s]
-
-/** The corners of the view's region in images without distortion, as homography_tracker has them. */
-HandEyeView viewFor(const StoredView& stored, const Camera& camera)
-{
-  const CameraWarp warp(cameraOf(stored, camera), camera.rectified());
-  cv::Rect region = warp.region(stored.region);
-  if (region.empty())
-  {
-    if (warp.active())
-    {
-      throw std::runtime_error("nothing of the view's region is in this camera's picture once distortion is removed");
-    }
-    region = cv::Rect(cv::Point(), stored.image.size());
-  }
-  HandEyeView view;
-  view.k = warp.to().k;
-  const auto corners = cornersOf(region);
-  view.corners.assign(corners.begin(), corners.end());
-  return view;
-}
 
 }  // namespace
 
@@ -76,7 +52,7 @@ HandEyeSession::HandEyeSession(const ros::NodeHandle& nh, const HandEyeSources& 
   {
     throw std::runtime_error("'" + info_topic + "': " + fault);
   }
-  view_ = viewFor(stored, camera);
+  collector_ = HandEyeCollector(handEyeViewOf(stored, camera));
   wait_for([&] {
     const std::string missing = transforms_.missing(sources_.base_frame, sources_.flange_frame, ros::Time(0));
     return missing.empty() ? missing : missing + ": say --base and --flange with the arm's frames";
@@ -132,7 +108,7 @@ bool HandEyeSession::update()
     last_message_ = next.time;
     if (message.view != sources_.view)
     {
-      still_.clear();
+      collector_.clear();
       hindrance_ = "'" + sources_.tracker + "' follows " +
                    (message.view.empty() ? "no view" : "another view, '" + message.view + "'") + ": call its ~start";
     }
@@ -142,8 +118,7 @@ bool HandEyeSession::update()
     }
     else if (!message.valid)
     {
-      still_.clear();
-      at_known_pose_ = false;
+      collector_.clear();
       hindrance_ = "the view is not followed: " + message.reason;
     }
     else
@@ -171,7 +146,7 @@ bool HandEyeSession::update()
   }
   if (Clock::now() > last_message_ + SILENT)
   {
-    still_.clear();
+    collector_.clear();
     hindrance_ = "nothing comes from '" + sources_.tracker + "'";
   }
   return added;
@@ -180,63 +155,11 @@ bool HandEyeSession::update()
 /** @return whether a pose was added. */
 bool HandEyeSession::take(const Homography& message)
 {
-  ArmSample sample;
-  sample.stamp = message.header.stamp.toSec();
-  const Eigen::Matrix3d h = Eigen::Map<const Eigen::Matrix<double, 3, 3, Eigen::RowMajor>>(message.h.data());
-  for (const Eigen::Vector2d& corner : view_.corners)
-  {
-    const Eigen::Vector2d seen = transfer(h, corner);
-    if (!seen.allFinite())
-    {
-      return false;
-    }
-    sample.seen.push_back(seen);
-  }
   constexpr double NO_WAIT = 0.0;
-  sample.flange_in_base = toIsometry(
+  const Eigen::Isometry3d flange_in_base = toIsometry(
       transforms_.lookUp(sources_.base_frame, sources_.flange_frame, message.header.stamp, NO_WAIT).transform);
   camera_frame_ = withoutSlash(message.header.frame_id);
-  const std::optional<ArmSample> still = still_.add(sample);
-  at_known_pose_ = false;
-  if (!still)
-  {
-    return false;
-  }
-  Correspondences corners;
-  for (std::size_t i = 0; i < view_.corners.size(); ++i)
-  {
-    corners.push_back({ view_.corners[i], still->seen[i] });
-  }
-  const std::optional<Eigen::Matrix3d> mean = homographyFromPoints(corners);
-  if (!mean)
-  {
-    return false;
-  }
-  const HandEyePose pose{ still->flange_in_base, *mean };
-  at_known_pose_ = !isNew(pose);
-  if (at_known_pose_)
-  {
-    return false;
-  }
-  poses_.push_back(pose);
-  at_known_pose_ = true;
-  return true;
-}
-
-/** Whether it is far enough from all that have been taken; poses beside each other tell little. */
-bool HandEyeSession::isNew(const HandEyePose& pose) const
-{
-  constexpr double FAR = 0.015;                  // [m]
-  constexpr double TURNED = 3.0 * M_PI / 180.0;  // [rad]
-  for (const HandEyePose& other : poses_)
-  {
-    const Eigen::Isometry3d way = other.flange_in_base.inverse() * pose.flange_in_base;
-    if (way.translation().norm() < FAR && rotationVector(way.linear()).norm() < TURNED)
-    {
-      return false;
-    }
-  }
-  return true;
+  return collector_.add(message.header.stamp.toSec(), homographyOf(message), flange_in_base);
 }
 
 }  // namespace view_servo

@@ -2,8 +2,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include "tools/hand_eye_collector.h"
 #include "view_servo/Homography.h"
-#include "view_servo/control/still_pose.h"
 #include "view_servo/geometry/hand_eye.h"
 #include "view_servo/ros/transform_source.h"
 
@@ -61,15 +61,15 @@ public:
   /** Whether the arm stands where a pose has been taken already. */
   bool atKnownPose() const
   {
-    return at_known_pose_;
+    return collector_.atKnownPose();
   }
   const HandEyeView& view() const
   {
-    return view_;
+    return collector_.view();
   }
   const std::vector<HandEyePose>& poses() const
   {
-    return poses_;
+    return collector_.poses();
   }
   /** The frame of the images; empty until there is one. */
   const std::string& cameraFrame() const
@@ -86,19 +86,15 @@ private:
   };
 
   bool take(const Homography& message);
-  bool isNew(const HandEyePose& pose) const;
 
   HandEyeSources sources_;
   TransformSource transforms_;
   std::mutex mutex_;  // guards info_ and inbox_
   sensor_msgs::CameraInfo::ConstPtr info_;
   std::deque<Received> inbox_;
-  HandEyeView view_;
-  StillPose still_;
-  std::vector<HandEyePose> poses_;
+  HandEyeCollector collector_;
   std::string camera_frame_;
   std::string hindrance_;
-  bool at_known_pose_ = false;
   Clock::time_point last_message_ = Clock::now();
   ros::Subscriber info_subscriber_;
   ros::Subscriber homography_subscriber_;

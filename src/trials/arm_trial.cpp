@@ -45,6 +45,15 @@ Puma makePuma(const std::string& urdf_xml, const ArmTrialParams& params)
   return Puma(urdf_xml, puma_params);
 }
 
+/** The twist of a frame by the twist of another one on the same body. @param other in the former frame. */
+Twist carried(const Eigen::Isometry3d& other, const Twist& twist)
+{
+  Twist result;
+  result.tail<3>() = other.linear() * twist.tail<3>();
+  result.head<3>() = other.linear() * twist.head<3>() + other.translation().cross(result.tail<3>());
+  return result;
+}
+
 ServoTarget targetOf(const World& world, const Eigen::Matrix3d& k)
 {
   return { k, { world.camera.width, world.camera.height }, middleOf(world.region) };
@@ -87,6 +96,7 @@ public:
       on_step_(on_step),
       puma_(makePuma(urdf_xml, params)),
       camera_(world, params.conditions.groups, params.seed + 1),
+      camera_in_described_(params.conditions.calibrated_camera.value_or(Eigen::Isometry3d::Identity())),
       k_(withFocalLengthError(world.camera, params.conditions.focal_length_error).k),
       tracker_(parts.view->grey(), world.region, k_, params.tracker),
       servo_(targetOf(world, k_), params.servo),
@@ -144,7 +154,7 @@ private:
   /** Takes an image and tracks the view in it, or begins to look for the view by its points when it is not tracked. */
   void track()
   {
-    const Eigen::Isometry3d camera_in_base = puma_.nominalCameraPose(puma_.measuredJoints());
+    const Eigen::Isometry3d camera_in_base = puma_.nominalCameraPose(puma_.measuredJoints()) * camera_in_described_;
     const cv::Mat image = takeImage();
     if (const std::optional<Found> found = found_.take(time_))
     {
@@ -195,7 +205,7 @@ private:
     }
     sent_ = limiter_.next(end_ ? Twist(Twist::Zero()) : servo_.command(time_), params_.control_period);
     servo_.sent(time_, sent_);
-    puma_.command(sent_);
+    puma_.command(carried(camera_in_described_, sent_));
   }
 
   void move()
@@ -228,7 +238,8 @@ private:
   const std::function<void(const ArmStep&)>& on_step_;
   Puma puma_;
   SimulatedCamera camera_;
-  Eigen::Matrix3d k_;  // as the calibration has it
+  Eigen::Isometry3d camera_in_described_;  // as tf has it
+  Eigen::Matrix3d k_;                      // as the calibration has it
   PlaneTracker tracker_;
   Servo25d servo_;
   TwistLimiter limiter_;

@@ -14,6 +14,7 @@
 #include <cstdint>
 #include <functional>
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -28,8 +29,13 @@ struct ArmConditions
   double encoder_noise = 0.0;               ///< standard deviation of each reading [rad]
   double hand_eye_translation_error = 0.0;  ///< of the camera's place on the hand [m]
   double hand_eye_rotation_error = 0.0;     ///< of its direction [rad]
-  double focal_length_error = 0.0;          ///< by which part the calibration has focal lengths too long
-  double covered_from = -1.0;               ///< when something covers the camera for 2 s [s]; negative: never
+  /**
+   * Where a calibration has the camera, in the optical frame of the arm's description. Tracking and servoing take it for the
+   * camera's frame; empty: they take the description's.
+   */
+  std::optional<Eigen::Isometry3d> calibrated_camera;
+  double focal_length_error = 0.0;  ///< by which part the calibration has focal lengths too long
+  double covered_from = -1.0;       ///< when something covers the camera for 2 s [s]; negative: never
 };
 
 struct ArmTrialParams

@@ -74,7 +74,7 @@ class Documented(unittest.TestCase):
     """Holds what all tests share: running nodes and their files."""
 
     maxDiff = None
-    ARM_VIEWS = {"shelf"}  # which the documents give to an arm; other views are a base's
+    ARM_VIEWS = {"above", "shelf"}  # which the documents give to an arm; other views are a base's
 
     @classmethod
     def setUpClass(cls):

@@ -139,6 +139,8 @@ NOT_FOR_USERS = {
         r"view ' ... ': bring the arm to .*",
         r"move the arm to another pose, .*",
         r"that is enough",
+        r" +poses (are kept in|before view ).*",
+        r"calibrate_hand_eye,  ... : poses for its option --file",
         r"errors: images  .*",
         r"Print this, and end",
         r"Exit status: .*",

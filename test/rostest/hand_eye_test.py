@@ -15,7 +15,9 @@ import unittest
 
 ROOT = os.path.realpath(os.path.join(os.path.dirname(os.path.abspath(__file__)), "..", ".."))
 sys.path.insert(0, os.path.join(ROOT, "test", "docs"))
+sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))
 import graph  # noqa: E402
+from arm_poses import looking_at_the_box, matrix_of  # noqa: E402
 
 import genpy.dynamic  # noqa: E402
 import geometry_msgs.msg  # noqa: E402
@@ -40,35 +42,6 @@ POSES = [(0.50, 0.00, 0.74, 0), (0.44, 0.12, 0.80, 15), (0.42, -0.13, 0.82, -20)
          (0.47, -0.12, 0.66, -30), (0.40, 0.02, 0.86, 5), (0.55, -0.06, 0.80, 25), (0.46, 0.14, 0.72, -15),
          (0.40, -0.04, 0.70, 35), (0.52, 0.06, 0.82, -35), (0.44, -0.15, 0.74, 10), (0.56, 0.03, 0.70, -8),
          (0.41, 0.10, 0.68, 20), (0.49, -0.10, 0.84, -10), (0.53, -0.12, 0.70, 18), (0.43, 0.00, 0.78, -28)]
-
-
-def quaternion_of(matrix):
-    """x, y, z, w of a rotation."""
-    values, vectors = numpy.linalg.eigh(numpy.array([
-        [matrix[0, 0] - matrix[1, 1] - matrix[2, 2], 0.0, 0.0, 0.0],
-        [matrix[0, 1] + matrix[1, 0], matrix[1, 1] - matrix[0, 0] - matrix[2, 2], 0.0, 0.0],
-        [matrix[0, 2] + matrix[2, 0], matrix[1, 2] + matrix[2, 1], matrix[2, 2] - matrix[0, 0] - matrix[1, 1], 0.0],
-        [matrix[2, 1] - matrix[1, 2], matrix[0, 2] - matrix[2, 0], matrix[1, 0] - matrix[0, 1], numpy.trace(matrix)]]))
-    return vectors[:, numpy.argmax(values)]
-
-
-def matrix_of(x, y, z, w):
-    return numpy.array([[1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)],
-                        [2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)],
-                        [2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)]])
-
-
-def looking_at_the_box(x, y, z, roll):
-    """The request of set_pose for a pose of POSES."""
-    ahead = numpy.array([0.96, 0.0, 0.74]) - [x, y, z]
-    ahead /= numpy.linalg.norm(ahead)
-    right = numpy.cross(ahead, [0.0, 0.0, 1.0])
-    right /= numpy.linalg.norm(right)
-    level = numpy.column_stack([right, numpy.cross(ahead, right), ahead])
-    c, s = numpy.cos(numpy.radians(roll)), numpy.sin(numpy.radians(roll))
-    turned = level @ numpy.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
-    return "{pose: {position: {x: %g, y: %g, z: %g}, orientation: {x: %.9f, y: %.9f, z: %.9f, w: %.9f}}}" % (
-        x, y, z, *quaternion_of(turned))
 
 
 def degrees_between(a, b):
@@ -137,9 +110,15 @@ class HandEye(graph.GraphTest):
 
     def test_calibrates_and_publishes(self):
         poses = list(POSES)
-        process = self.begin("--view box --flange flange --out mounted.yaml")
+        recording = self.graph.start("rosbag", "record", "--output-name=arm.bag", "/tf", "/tf_static",
+                                     "/homography_tracker/homography", "/camera/camera_info")
+        graph.wait_until("the recording", lambda: any(
+            node.startswith("/record") for node in self.graph.state()[1].get("/homography_tracker/homography", [])))
+        process = self.begin("--view box --flange flange --keep poses.yaml --out mounted.yaml")
         text = self.lead(process, poses)
         self.assertEqual(process.returncode, DONE, text)
+        recording.send_signal(signal.SIGINT)
+        recording.wait(20.0)
         with open(os.path.join(self.directory, "mounted.yaml")) as file:
             found = yaml.safe_load(file)
         self.assertEqual(found["parameters"], {
@@ -155,9 +134,44 @@ class HandEye(graph.GraphTest):
         self.assertIn("hand_eye:=mounted.yaml", text)
         self.assertIn("static_transform_publisher %.6f" % place[0], text)
 
+        self.check_offline(numbers, place, rotation)
+
         # A file that exists is kept.
         self.calibrate("--view box --flange flange --out mounted.yaml", CANNOT, "exists: say --overwrite")
         self.check_publishing(found, place, rotation)
+
+    def check_offline(self, numbers, place, rotation):
+        """Without a master, from the poses that were kept, and from the bag."""
+        offline = "ROS_MASTER_URI=http://localhost:1 rosrun view_servo calibrate_hand_eye "
+        status, text = self.graph.run(offline + "--file poses.yaml --out again.yaml")
+        self.assertEqual(status, DONE, text)
+        with open(os.path.join(self.directory, "again.yaml")) as file:
+            again = yaml.safe_load(file)
+        for name, value in numbers.items():
+            self.assertAlmostEqual(again["transformation"][name], value, 6, name)
+        status, text = self.graph.run(offline + "--file arm.bag --view box --flange flange --out by_bag.yaml")
+        self.assertEqual(status, DONE, text)
+        with open(os.path.join(self.directory, "by_bag.yaml")) as file:
+            by_bag = yaml.safe_load(file)
+        self.assertEqual(by_bag["parameters"], again["parameters"])
+        found = by_bag["transformation"]
+        self.assertLess(1e3 * numpy.linalg.norm([found[name] for name in "xyz"] - place), 0.5, text)
+        self.assertLess(degrees_between(matrix_of(*(found["q" + name] for name in "xyzw")), rotation), 0.1, text)
+        # What it may lack.
+        for words, complaint in (
+                ("--file arm.bag", "--view NAME"),
+                ("--file arm.bag --view nothing", "'nothing'"),
+                ("--file arm.bag --view box --flange wrist", "its tf does not know 'wrist' in 'base_link'.*--flange"),
+                ("--file arm.bag --view box --camera nobody", "no camera_info is in it on '/nobody/camera_info'"),
+                ("--file arm.bag --view box --tracker nobody", "no homography of view 'box' is in it on '/nobody/homography'"),
+                ("--file poses.yaml --keep poses.yaml", "'poses.yaml' exists: say --overwrite, or another file by --keep"),
+                ("--file nowhere.bag --view box", "nowhere.bag.*no such file"),
+                ("--file nowhere.yaml", "nowhere.yaml.*no such file"),
+                ("--file mounted.yaml", "has not all of parameters, view and poses"),
+                ("--file text.bag --view box", "text.bag")):
+            with open(os.path.join(self.directory, "text.bag"), "w") as file:
+                file.write("no bag")
+            self.calibrate(words + " --out bad.yaml", CANNOT, complaint)
 
     def check_publishing(self, found, place, rotation):
         # tf has the camera on the flange already.

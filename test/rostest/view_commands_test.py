@@ -291,6 +291,17 @@ class ViewCommands(graph.GraphTest):
         for tracker in self.homing.server.status_list:
             tracker.status.status = 4
 
+    def test_go_to_several_views(self):
+        out = self.view("go above shelf --approach 0.01 0.05 servo:=arm1/servo --driver servo_25d")
+        self.assertIn("to drive to 'above', then 'shelf'; Ctrl-C stops it", out)
+        goal = self.arm.goals[-1]
+        self.assertEqual((goal.view, [(view.view, view.translation_tolerance, view.rotation_tolerance) for view in goal.views]),
+                         ("", [("above", 0.01, 0.05), ("shelf", 0.0, 0.0)]))
+        self.view("go shelf servo:=arm1/servo --driver servo_25d")
+        self.assertEqual((self.arm.goals[-1].view, self.arm.goals[-1].views), ("shelf", []))
+        self.end(self.begin("go", "above", "dock", "--driver", "homing"), CANNOT, "drives to one view, and 2 are named")
+        self.assertEqual(self.homing.goals, [])
+
     def test_stop(self):
         self.homing.behaviour = self.arm.behaviour = "drive"
         runs = [self.begin("go", "dock"), self.begin("go", "shelf", "servo:=arm1/servo", "--driver", "servo_25d")]

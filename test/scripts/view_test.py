@@ -46,8 +46,10 @@ class Arguments(unittest.TestCase):
         options = parse("save", "dock", "--overwrite", "--roi", "1", "2", "30", "40", "--file", "x.png")
         self.assertEqual((options.name, options.overwrite, options.roi, options.file), ("dock", True, [1, 2, 30, 40], "x.png"))
         options = parse("go", "--timeout", "2.5", "dock", "--enable", "--driver", "homing", "--patience", "3")
-        self.assertEqual((options.name, options.timeout, options.enable, options.driver, options.patience),
-                         ("dock", 2.5, True, "homing", 3.0))
+        self.assertEqual((options.names, options.timeout, options.enable, options.driver, options.patience),
+                         (["dock"], 2.5, True, "homing", 3.0))
+        options = parse("go", "above", "shelf", "--approach", "0.01", "0.05", "--enable")
+        self.assertEqual((options.names, options.approach, options.enable), (["above", "shelf"], [0.01, 0.05], True))
 
     def test_bad(self):
         for words, complaint in (
@@ -59,6 +61,9 @@ class Arguments(unittest.TestCase):
                 (["go", "dock", "--timeout", "soon"], "invalid positive value: 'soon'"),
                 (["go", "dock", "--driver", "walking"], "invalid choice: 'walking'"),
                 (["go", "dock", "--ena"], "unrecognized arguments: --ena"),
+                (["go", "above", "shelf", "--approach", "0.01"], "expected 2 arguments"),
+                (["go", "above", "shelf", "--approach", "0.01", "0"], "0 is not a tolerance"),
+                (["go", "shelf", "--approach", "0.01", "0.05"], "there is one only"),
                 (["save", "dock", "--roi", "1", "2", "3"], "expected 4 arguments"),
                 (["save", "dock", "--roi", "1", "2", "3", "-4"], "--roi"),
                 (["save", "dock", "--roi", "1", "2", "0", "4"], "at least 1 pixel"),
@@ -225,13 +230,15 @@ class Completion(unittest.TestCase):
                          [kind.name for kind in view.DRIVER_KINDS])
 
     def test_views(self):
-        for words in (["go"], ["show"], ["delete"], ["go", "--enable"], ["go", "--timeout", "3"], ["save", "--overwrite"],
+        for words in (["go"], ["go", "dock"], ["go", "--approach", "0.01", "0.03", "dock"], ["show"], ["delete"],
+                      ["go", "--enable"], ["go", "--timeout", "3"], ["save", "--overwrite"],
                       ["save", "--overwrite", "--roi", "1", "2", "3", "4"]):
             with self.subTest(words=words):
                 self.assertEqual(self.complete("view_servo", "view", *words, ""), ["dock", "shelf"])
         self.assertEqual(self.complete("view_servo", "view", "go", "sh"), ["shelf"])
         self.assertEqual(self.complete("view_servo", "view", "go", "__ns", ":=", "/robot1", ""), ["attic"])
-        for words in (["save", ""], ["go", "dock", ""], ["list", ""], ["stop", ""], ["go", "--timeout", ""],
+        for words in (["save", ""], ["show", "dock", ""], ["list", ""], ["stop", ""], ["go", "--timeout", ""],
+                      ["go", "--approach", ""], ["go", "--approach", "0.01", ""],
                       ["save", "--overwrite", "--roi", "1", ""], ["fly", ""]):
             with self.subTest(words=words):
                 self.assertEqual(self.complete("view_servo", "view", *words), [])

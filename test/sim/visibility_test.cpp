@@ -180,4 +180,21 @@ TEST(ShareInSight, CountsNotWhatIsHidden)
   EXPECT_EQ(shareInSight(world, reference, behind), 1.0);
 }
 
+TEST(RegionSeenFrom, IsWhereTheSameSurfaceIsInTheOtherImage)
+{
+  World world = wallWorld();
+  world.goal = cameraAt(0.0, 0.0);
+  world.region = cv::Rect(220, 140, 200, 200);
+  EXPECT_EQ(regionSeenFrom(world, world.goal), world.region);
+  // A fifth nearer, everything is a quarter farther from the middle, which is at 319.5, 239.5.
+  EXPECT_EQ(regionSeenFrom(world, cameraAt(0.8, 0.0)), cv::Rect(195, 115, 250, 250));
+  // 0.8 m to the left, by 500 / 4 pixels a metre to the right.
+  EXPECT_EQ(regionSeenFrom(world, cameraAt(0.0, 0.8)), cv::Rect(320, 140, 200, 200));
+  // What leaves the image is cut off, and what is behind the camera is not there.
+  EXPECT_EQ(regionSeenFrom(world, cameraAt(0.0, 2.4)), cv::Rect(520, 140, 120, 200));
+  EXPECT_TRUE(regionSeenFrom(world, cameraAt(0.0, 0.0, M_PI)).empty());
+  world.region = cv::Rect();
+  EXPECT_EQ(regionSeenFrom(world, cameraAt(2.0, 0.0)), cv::Rect(0, 0, 640, 480));
+}
+
 }  // namespace view_servo::sim

@@ -8,6 +8,7 @@
 
 #include <gtest/gtest.h>
 
+#include <cstddef>
 #include <filesystem>
 #include <stdexcept>
 #include <string>
@@ -99,6 +100,77 @@ TEST_F(HandEyeFileTest, NamesWhatIsWrong)
   std::filesystem::remove(path_);
   EXPECT_THROW(readHandEyeFile(path_), std::runtime_error);
   EXPECT_THROW(writeHandEyeFile({}, (directory_.path() / "nowhere" / "x.yaml").string()), std::runtime_error);
+}
+
+class HandEyePosesFileTest : public HandEyeFileTest
+{
+protected:
+  static HandEyePosesFile poses()
+  {
+    HandEyePosesFile file;
+    file.base_frame = "base_link";
+    file.flange_frame = "tool0";
+    file.camera_frame = "camera_optical_frame";
+    file.view_name = "shelf";
+    file.view.k << 700.0, 0.0, 319.5, 0.0, 701.0, 239.5, 0.0, 0.0, 1.0;
+    file.view.corners = { { 1.0, 2.0 }, { 101.5, 2.0 }, { 101.5, 52.25 }, { 1.0, 52.25 } };
+    for (const double angle : { 0.1, -2.0 })
+    {
+      const Eigen::Isometry3d flange =
+          Eigen::Translation3d(angle, 1.0 / 3.0, 0.0) * Eigen::AngleAxisd(angle, Eigen::Vector3d::UnitY());
+      Eigen::Matrix3d h;
+      h << angle, -0.1 / 3.0, 20.0 * angle, 0.01, 0.9, -30.0, 1e-5 / 3.0, 2e-5, 1.0;
+      file.poses.push_back({ flange, h });
+    }
+    file.comment = "a comment";
+    return file;
+  }
+
+  /** What is wrong with a file in which one text takes the place of another. */
+  std::string faultOfPoses(const std::string& before, const std::string& after) const
+  {
+    writeHandEyePosesFile(poses(), path_);
+    test::writeText(path_, test::edited(test::readText(path_), before, after));
+    return test::thrownMessage<std::runtime_error>([this] { readHandEyePosesFile(path_); });
+  }
+};
+
+TEST_F(HandEyePosesFileTest, ReadsWhatItHasWritten)
+{
+  const HandEyePosesFile written = poses();
+  writeHandEyePosesFile(written, path_);
+  const HandEyePosesFile read = readHandEyePosesFile(path_);
+  EXPECT_EQ(read.base_frame, written.base_frame);
+  EXPECT_EQ(read.flange_frame, written.flange_frame);
+  EXPECT_EQ(read.camera_frame, written.camera_frame);
+  EXPECT_EQ(read.view_name, written.view_name);
+  EXPECT_EQ(read.view.k, written.view.k);
+  ASSERT_EQ(read.view.corners.size(), 4U);
+  EXPECT_EQ(read.view.corners[2], written.view.corners[2]);
+  ASSERT_EQ(read.poses.size(), 2U);
+  for (std::size_t i = 0; i < 2; ++i)
+  {
+    EXPECT_TRUE(read.poses[i].flange_in_base.isApprox(written.poses[i].flange_in_base, 1e-14));
+    EXPECT_TRUE(read.poses[i].h.isApprox(written.poses[i].h, 1e-15));
+  }
+}
+
+TEST_F(HandEyePosesFileTest, NamesWhatIsWrong)
+{
+  const auto has = [](const std::string& text, const std::string& part) {
+    return text.find(part) != std::string::npos;
+  };
+  EXPECT_TRUE(has(faultOfPoses("eye_on_hand: true", "eye_on_hand: false"), "eye_on_hand"));
+  EXPECT_TRUE(has(faultOfPoses("view:", "picture:"), "parameters, view and poses"));
+  EXPECT_TRUE(has(faultOfPoses("camera_matrix: [700,", "camera_matrix: ["), "view/camera_matrix has not 9 numbers"));
+  EXPECT_TRUE(has(faultOfPoses("corners: [[1, 2]", "corners: [[1]"), "has not 2 numbers"));
+  EXPECT_TRUE(has(faultOfPoses("homography: [0.1,", "homography: ["), "poses/0/homography has not 9 numbers"));
+  EXPECT_TRUE(has(faultOfPoses("x: 0.1,", "x: .inf,"), "poses/0/flange is none"));
+  EXPECT_TRUE(has(faultOfPoses("x: 0.1,", ""), "poses/0/flange/x"));
+  EXPECT_TRUE(has(faultOfPoses("name: shelf", "names: shelf"), "view/name"));
+  std::filesystem::remove(path_);
+  EXPECT_TRUE(has(test::thrownMessage<std::runtime_error>([this] { readHandEyePosesFile(path_); }), path_));
+  EXPECT_THROW(writeHandEyePosesFile({}, (directory_.path() / "nowhere" / "x.yaml").string()), std::runtime_error);
 }
 
 }  // namespace view_servo

@@ -6,6 +6,8 @@
 #include "view_servo/ServoError.h"
 #include "view_servo/control/joint_guard.h"
 #include "view_servo/control/servo_25d.h"
+#include "view_servo/geometry/camera.h"
+#include "view_servo/views/view_store.h"
 
 #include <std_msgs/Header.h>
 
@@ -18,6 +20,14 @@ namespace view_servo
 /** @file
  * Between the core's types for an arm and messages.
  */
+
+/**
+ * What servoing to a stored view needs: the camera's matrix and image size once distortion is removed, and the middle of the
+ * view's region there, which is the chosen point.
+ * @param camera that is there now. @throws std::runtime_error naming the view when this camera cannot show that point, and as
+ * cameraOf() does.
+ */
+ServoTarget servoTargetOf(const StoredView& view, const Camera& camera);
 
 /**
  * A valid homography as servoing takes it. @throws std::runtime_error naming a number outside the range in

@@ -2,6 +2,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include "view_servo/geometry/hand_eye.h"
+
 #include <Eigen/Geometry>
 
 #include <string>
@@ -29,5 +31,28 @@ HandEyeFile readHandEyeFile(const std::string& path);
 
 /** Writes such a file in one step. @throws std::runtime_error naming the file when it cannot be written. */
 void writeHandEyeFile(const HandEyeFile& hand_eye, const std::string& path);
+
+/** What a calibration is computed from, as a file holds it. */
+struct HandEyePosesFile
+{
+  std::string base_frame;    ///< of the arm
+  std::string flange_frame;  ///< that the camera is mounted on
+  std::string camera_frame;  ///< the camera's optical frame
+  std::string view_name;     ///< of the stored view
+  HandEyeView view;
+  std::vector<HandEyePose> poses;
+  std::string comment;  ///< one line; is written, not read
+};
+
+/**
+ * Reads a file as writeHandEyePosesFile() writes it: `parameters` as in a HandEyeFile; `view` with name, camera_matrix (9
+ * numbers by rows) and corners (4 pairs); `poses`, each with flange (x, y, z, qx, qy, qz, qw) and homography (9 numbers by
+ * rows, x_cur ~ H x_view).
+ * @throws std::runtime_error naming the file and what is wrong with it.
+ */
+HandEyePosesFile readHandEyePosesFile(const std::string& path);
+
+/** Writes such a file in one step. @throws std::runtime_error naming the file when it cannot be written. */
+void writeHandEyePosesFile(const HandEyePosesFile& poses, const std::string& path);
 
 }  // namespace view_servo
