@@ -208,6 +208,15 @@ public:
     return 2 * unique.size() < all;
   }
 
+  /** All that corners confirm. */
+  std::vector<Eigen::Matrix3d> planes() const
+  {
+    std::vector<Eigen::Matrix3d> result;
+    std::transform(planes_.begin(), planes_.end(), std::back_inserter(result),
+                   [](const Plane& plane) { return plane.h; });
+    return result;
+  }
+
   /** The plane that corners confirm best, when it is beyond doubt and not mirrored. */
   std::optional<Eigen::Matrix3d> plane() const
   {
@@ -635,8 +644,8 @@ ViewMatch SceneMatcher::match(const PreparedImage& reference, const PreparedImag
   const std::optional<Eigen::Matrix3d> plane = found ? std::nullopt : attempt.plane();
   const bool repeated = (found || plane) && params_.points.unique && attempt.isRepeated();
   clock.finish("unique");
-  const bool mirrored =
-      (found || plane) && !repeated && params_.points.refuse_mirrored && isMirrored(reference, 0, current, 0, 0.0, rng);
+  const bool mirrored = (found || plane) && !repeated && params_.points.refuse_mirrored &&
+                        isMirrored(reference, 0, current, 0, attempt.planes(), rng);
   clock.finish("mirror");
   const bool refused = repeated || mirrored;
   if (found && !refused)
