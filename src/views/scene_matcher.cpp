@@ -33,6 +33,7 @@ constexpr double HUBER_WIDTH = 0.5;  // of the last fit: residuals beyond count 
 constexpr std::size_t MIN_MATCHES = 15;
 // Significance of a plane: wrong ones of pairs that show nothing in common had 6.7 at most.
 constexpr double BEYOND_DOUBT = 15.0;
+constexpr double IN_ORDER = 0.75;      // part of the matches of a fundamental matrix, see keepsOrientation()
 constexpr double SEARCH_RADIUS = 4.0;  // around where a plane sends a corner [px]
 
 /** A plane that corners confirm. */
@@ -147,6 +148,10 @@ public:
   /** The best fundamental matrix, `other` being one that was found before; true if it stands without its best plane. */
   bool fit(const std::optional<Eigen::Matrix3d>& other, RansacStatistics& statistics)
   {
+    if (isBeyondDoubt(bestPlane()))
+    {
+      addMatchesNear(bestPlane()->h);
+    }
     if (pairs_.size() < MIN_MATCHES)
     {
       return false;
@@ -169,11 +174,6 @@ public:
     for (const Eigen::Matrix3d& hypothesis : hypotheses)
     {
       consider(hypothesis);
-    }
-    if (!holds() && matrix_ && isBeyondDoubt(bestPlane()))
-    {
-      addMatchesNear(bestPlane()->h);
-      consider(*std::exchange(matrix_, std::nullopt));
     }
     return holds();
   }
@@ -276,7 +276,7 @@ private:
   /** Whether the fundamental matrix is one that chance does not explain, also without its best plane. */
   bool holds() const
   {
-    return matrix_ && margin_ >= 0.0 && keepsOrientation(agreeing(*matrix_));
+    return matrix_ && margin_ >= 0.0 && keepsOrientation(agreeing(*matrix_), IN_ORDER);
   }
 
   std::vector<GuidedMatch> search(const std::vector<Corner>& corners, const Eigen::Matrix3d& h) const
@@ -284,10 +284,14 @@ private:
     return searchAlongHomography(reference_.grey(), corners, current_.grey(), h, SEARCH_RADIUS, guidance_);
   }
 
-  /** Corners off the planes that are seen not far from where one would show them: they say most of the parallax. */
+  /**
+   * Corners off the planes that are seen not far from where one would show them: they say most of the parallax. Each has
+   * to be found again from the current image, where something else looks more like it, it is not.
+   */
   void addMatchesNear(const Eigen::Matrix3d& h)
   {
     constexpr double RADIUS = 24.0;  // [px]
+    constexpr double SAME = 1.5;     // place [px]
     std::vector<Corner> others;
     for (std::size_t i = 0; i < corners_.size(); ++i)
     {
@@ -296,12 +300,24 @@ private:
         others.push_back(corners_[i]);
       }
     }
+    const std::vector<GuidedMatch> there =
+        searchAlongHomography(reference_.grey(), others, current_.grey(), h, RADIUS, guidance_);
+    std::vector<Corner> seen;
+    seen.reserve(there.size());
+    for (const GuidedMatch& match : there)
+    {
+      seen.push_back({ match.current, 0.0F });
+    }
     std::vector<MatchedPoint> near;
     for (const GuidedMatch& match :
-         searchAlongHomography(reference_.grey(), others, current_.grey(), h, RADIUS, guidance_))
+         searchAlongHomography(current_.grey(), seen, reference_.grey(), h.inverse(), RADIUS, guidance_))
     {
-      const Eigen::Vector2d& at = others[static_cast<std::size_t>(match.reference)].position;
-      near.push_back({ { at, match.current }, match.correlation, false });
+      const GuidedMatch& forth = there[static_cast<std::size_t>(match.reference)];
+      const Eigen::Vector2d& at = others[static_cast<std::size_t>(forth.reference)].position;
+      if ((match.current - at).norm() <= SAME)
+      {
+        near.push_back({ { at, forth.current }, forth.correlation, false });
+      }
     }
     std::stable_sort(near.begin(), near.end(),
                      [](const MatchedPoint& a, const MatchedPoint& b) { return a.score > b.score; });
