@@ -426,26 +426,46 @@ private:
     return logSignificance(pairs_.size(), supporting.size(), FundamentalEstimator::SAMPLE_SIZE, chance);
   }
 
-  /** Keeps a fundamental matrix, or one of its best plane and the parallax off it, if that is the best so far. */
+  /**
+   * Keeps a fundamental matrix, or one of its best plane and the parallax off it, if that is the best so far. Where little
+   * lies far off the plane, what lies near it is told from it by half the threshold.
+   */
   void consider(const Eigen::Matrix3d& hypothesis)
   {
-    constexpr int SAMPLES = 1500;
-    Correspondences supporting = agreeing(hypothesis);
+    constexpr double FINE = 0.5;
+    const Correspondences supporting = agreeing(hypothesis);
     if (supporting.size() < MIN_MATCHES)
     {
       return;
     }
-    const Plane plane = bestPlaneOf(supporting);
-    const Parallax parallax(plane.h, pairs_, params_.inlier_threshold);
-    std::vector<Eigen::Matrix3d> choices{ polishFundamental(hypothesis, supporting, HUBER_WIDTH) };
+    Plane plane = bestPlaneOf(supporting);
+    weigh(hypothesis, plane, params_.inlier_threshold);
+    if (margin_ < 0.0)
+    {
+      const double tolerance = FINE * params_.inlier_threshold;
+      Correspondences near;
+      std::copy_if(supporting.begin(), supporting.end(), std::back_inserter(near),
+                   [&](const Correspondence& pair) { return sampsonError(hypothesis, pair) <= tolerance * tolerance; });
+      const auto h = view_servo::bestPlane(near, 2.0 * tolerance, rng_);
+      plane.h = h.value_or(plane.h);
+      weigh(hypothesis, plane, tolerance);
+    }
+  }
+
+  /** The same for one plane and tolerance. */
+  void weigh(const Eigen::Matrix3d& hypothesis, const Plane& plane, double tolerance)
+  {
+    constexpr int SAMPLES = 1500;
+    const double tests = std::log10(2.0);  // tolerances that may be tried
+    const Parallax parallax(plane.h, pairs_, tolerance);
+    std::vector<Eigen::Matrix3d> choices{ polishFundamental(hypothesis, agreeing(hypothesis), HUBER_WIDTH) };
     if (const auto of_plane = parallax.findFundamental(SAMPLES, rng_))
     {
-      supporting = agreeing(*of_plane);
-      choices.push_back(polishFundamental(*of_plane, supporting, HUBER_WIDTH));
+      choices.push_back(polishFundamental(*of_plane, agreeing(*of_plane), HUBER_WIDTH));
     }
     for (const Eigen::Matrix3d& choice : choices)
     {
-      const double held = parallax.significance(choice);
+      const double held = parallax.significance(choice) - tests;
       const double significance = significanceOf(choice);
       // A plane that is beyond doubt and what its parallax says determine a fundamental matrix as well as all matches do.
       const double evidence = isBeyondDoubt(&plane) ? std::max(significance, held) : significance;
