@@ -34,6 +34,7 @@ constexpr std::size_t MIN_MATCHES = 15;
 // Significance of a plane: wrong ones of pairs that show nothing in common had 6.7 at most.
 constexpr double BEYOND_DOUBT = 15.0;
 constexpr double IN_ORDER = 0.75;      // part of the matches of a fundamental matrix, see keepsOrientation()
+constexpr double LEAST_CHANCE = 0.01;  // that a corner is found beside a plane
 constexpr double SEARCH_RADIUS = 4.0;  // around where a plane sends a corner [px]
 
 /** A plane that corners confirm. */
@@ -110,7 +111,9 @@ public:
     constexpr double LEAST = 6.0;  // significance
     const std::size_t seen = countSeen(corners_, h);
     const std::vector<GuidedMatch> matches = search(corners_, h);
-    const double significance = -logBinomialTail(seen, matches.size(), chanceBeside(h));
+    // What is found beside only lowers the significance: few planes need to be asked for it.
+    const bool maybe = -logBinomialTail(seen, matches.size(), LEAST_CHANCE) >= LEAST;
+    const double significance = maybe ? -logBinomialTail(seen, matches.size(), chanceBeside(h)) : 0.0;
     if (significance < LEAST)
     {
       return;
@@ -340,7 +343,6 @@ private:
   /** The share of corners that are found when they are sought where the plane does not say. */
   double chanceBeside(const Eigen::Matrix3d& h) const
   {
-    constexpr double LEAST = 0.01;
     constexpr double BESIDE = 25.0;  // [px]
     constexpr std::size_t EVERY = 3;
     std::vector<Corner> some;
@@ -357,7 +359,7 @@ private:
       seen += countSeen(some, shift * h);
       found += search(some, shift * h).size();
     }
-    return seen > 0 ? std::max(LEAST, static_cast<double>(found) / static_cast<double>(seen)) : 1.0;
+    return seen > 0 ? std::max(LEAST_CHANCE, static_cast<double>(found) / static_cast<double>(seen)) : 1.0;
   }
 
   bool agrees(const Eigen::Matrix3d& f, const Correspondence& pair) const
@@ -467,8 +469,10 @@ private:
     {
       const double held = parallax.significance(choice) - tests;
       const double significance = significanceOf(choice);
-      // A plane that is beyond doubt and what its parallax says determine a fundamental matrix as well as all matches do.
-      const double evidence = isBeyondDoubt(&plane) ? std::max(significance, held) : significance;
+      // A plane that is beyond doubt and what its parallax says determine a fundamental matrix as well as all matches do;
+      // but what lies near a plane may be off it because the plane does not fit.
+      const bool off_plane = isBeyondDoubt(&plane) && tolerance >= params_.inlier_threshold;
+      const double evidence = off_plane ? std::max(significance, held) : significance;
       const double margin = std::min(held - params_.points.min_log_parallax, evidence - params_.min_log_significance);
       // Of those that hold, the one with which most matches agree.
       const std::size_t support = agreeing(choice).size();
