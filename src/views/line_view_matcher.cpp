@@ -36,7 +36,7 @@ constexpr double NOT_A_NUMBER = std::numeric_limits<double>::quiet_NaN();
 constexpr double BEYOND_CHANCE = 7.0;
 // Symmetric things in a mirrored image, as a chessboard, have matched with this significance.
 constexpr double BEYOND_MIRRORS = 120.0;
-constexpr double DOUBTFUL = 25.0;  // a significance that calls for more care with that
+constexpr double DOUBTFUL = 100.0;  // a significance that calls for more care with that
 
 /** How sure a match is: the mean of what the segments share and of how alike their surroundings look. */
 double quality(const SegmentMatch& match)
@@ -594,7 +594,7 @@ ViewMatch LineViewMatcher::match(const PreparedImage& reference, const PreparedI
     Rng rng(params_.seed);
     // Corners are found in less time in the images of half the size, but fewer.
     const int level = result.log_significance < DOUBTFUL ? 0 : 2;
-    if (isMirrored(reference, level, current, level, 0.0, rng))
+    if (isMirrored(reference, level, current, level, result.planes, rng))
     {
       refuse(result);
       result.fundamental.setConstant(NOT_A_NUMBER);

@@ -5,6 +5,10 @@
 #include "view_servo/robust/random.h"
 #include "view_servo/views/prepared_image.h"
 
+#include <Eigen/Core>
+
+#include <vector>
+
 namespace view_servo
 {
 /** What a matcher says when isMirrored(). */
@@ -14,15 +18,16 @@ constexpr const char* MIRRORED =
 
 /**
  * Whether a current image, turned left to right, shows the reference better than as it is. Symmetric things (facades, a
- * chessboard) match in a mirrored image, too; what is around them then shows that it is mirrored.
+ * chessboard) match in a mirrored image, too; what is around them, and their details, then show that it is mirrored.
  *
  * Profiles are the same in a mirrored image and only their cyclic order is reversed, so the corners need not be found
- * anew: they are matched once as they are and once mirrored.
+ * anew. Where the mirrored ones match, the plane on which they do and those that were found are compared by how many of
+ * the reference's corners look alike along them: an oblique view, which few profiles show, is not refused for what
+ * little matches mirrored.
  * @param reference_level, current_level the scales at which the images match.
- * @param significance -log10 of the false alarms of the points' geometry that was found. It is from more profiles than are compared
- * here, which may be too few for an oblique view: the mirrored image has to reach half of it.
+ * @param planes that the geometry that was found agrees with, x_cur ~ H x_ref in pixels of the full images.
  */
 bool isMirrored(const PreparedImage& reference, int reference_level, const PreparedImage& current, int current_level,
-                double significance, Rng& rng);
+                std::vector<Eigen::Matrix3d> planes, Rng& rng);
 
 }  // namespace view_servo

@@ -253,16 +253,21 @@ public:
       guide(rng);
       clock.finish("guided");
     }
+    const std::optional<Eigen::Matrix3d> plane = mainPlane(rng);
     if (params_.unique)
     {
-      refusal_ = isRepeated(rng) ? Refusal::REPEATED : Refusal::NONE;
+      refusal_ = plane && isRepeated(*plane) ? Refusal::REPEATED : Refusal::NONE;
       clock.finish("unique");
     }
     const bool maybe_mirrored = result.log_significance < BEYOND_MIRRORS || agreeingPart() < MOST_CANDIDATES;
     if (refusal_ == Refusal::NONE && params_.refuse_mirrored && maybe_mirrored)
     {
-      const bool mirrored =
-          isMirrored(reference_, levels_.reference, current_, levels_.current, result.log_significance, rng);
+      std::vector<Eigen::Matrix3d> planes;
+      if (plane)
+      {
+        planes.push_back(*plane);
+      }
+      const bool mirrored = isMirrored(reference_, levels_.reference, current_, levels_.current, planes, rng);
       refusal_ = mirrored ? Refusal::MIRRORED : Refusal::NONE;
       clock.finish("mirror");
     }
@@ -443,28 +448,33 @@ private:
     }
   }
 
-  /** Whether what agrees with the geometry is found elsewhere nearly as well, in the full images: periods may be small. */
-  bool isRepeated(Rng& rng) const
+  /** The plane on which most of what agrees with the geometry lies, in pixels of the full images. */
+  std::optional<Eigen::Matrix3d> mainPlane(Rng& rng) const
   {
     Correspondences pairs;
     for (const CornerMatch& match : inliers_)
     {
       pairs.push_back(level_.correspondence(match));
     }
-    const std::optional<Eigen::Matrix3d> plane = geometry_.mainPlane(matrix_, pairs, rng);
-    if (!plane)
+    std::optional<Eigen::Matrix3d> plane = geometry_.mainPlane(matrix_, pairs, rng);
+    if (plane)
     {
-      return false;
+      *plane = current_.toFull(levels_.current) * *plane * reference_.toFull(levels_.reference).inverse();
     }
-    const Eigen::Matrix3d reference_map = reference_.toFull(levels_.reference);
-    const Eigen::Matrix3d current_map = current_.toFull(levels_.current);
-    for (Correspondence& pair : pairs)
+    return plane;
+  }
+
+  /** Whether what agrees with the geometry is found elsewhere nearly as well, in the full images: periods may be small. */
+  bool isRepeated(const Eigen::Matrix3d& plane) const
+  {
+    Correspondences pairs;
+    for (const CornerMatch& match : inliers_)
     {
-      pair = { transfer(reference_map, pair.reference), transfer(current_map, pair.current) };
+      const Correspondence pair = level_.correspondence(match);
+      pairs.push_back({ transfer(reference_.toFull(levels_.reference), pair.reference),
+                        transfer(current_.toFull(levels_.current), pair.current) });
     }
-    return otherPlace(reference_.grey(), current_.grey(), pairs, current_.points(0).corners,
-                      current_map * *plane * reference_map.inverse())
-        .has_value();
+    return otherPlace(reference_.grey(), current_.grey(), pairs, current_.points(0).corners, plane).has_value();
   }
 
   /**

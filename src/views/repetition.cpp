@@ -116,19 +116,27 @@ private:
   std::vector<Eigen::Vector2d> places_;
 };
 
-/** Some matches that agree with one homography, to be found again along another. */
+/**
+ * Some matches that are found along one homography, to be found again along another. Those that are not found there would
+ * not be found elsewhere either, and tell nothing.
+ */
 class Matches
 {
 public:
-  Matches(const cv::Mat& reference, const cv::Mat& current, const Correspondences& all)
+  Matches(const cv::Mat& reference, const cv::Mat& current, const Correspondences& all, const Eigen::Matrix3d& h)
     : reference_(reference), current_(current)
   {
     constexpr std::size_t MOST = 150;
     guidance_.min_correlation = MIN_CORRELATION;
     const std::size_t count = std::min(MOST, all.size());
+    std::vector<Corner> some;
+    some.reserve(count);
     for (std::size_t i = 0; i < count; ++i)
     {
-      const Correspondence& match = all[i * all.size() / count];
+      some.push_back({ all[i * all.size() / count].reference, 0.0F });
+    }
+    for (const Correspondence& match : find(some, h, RADIUS))
+    {
       corners_.push_back({ match.reference, 0.0F });
       here_.push_back(match.current);
     }
@@ -291,7 +299,7 @@ std::optional<Eigen::Matrix3d> otherPlace(const cv::Mat& reference, const cv::Ma
     return std::nullopt;
   }
   const Surroundings surroundings(current, current_corners);
-  const Matches tried(reference, current, matches);
+  const Matches tried(reference, current, matches, h);
   for (const Eigen::Vector2d& site : spread(matches, current.size(), SITES))
   {
     const std::vector<Eigen::Vector2d> alike = surroundings.like(site);

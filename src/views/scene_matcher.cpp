@@ -33,6 +33,8 @@ constexpr double HUBER_WIDTH = 0.5;  // of the last fit: residuals beyond count 
 constexpr std::size_t MIN_MATCHES = 15;
 // Significance of a plane: wrong ones of pairs that show nothing in common had 6.7 at most.
 constexpr double BEYOND_DOUBT = 15.0;
+constexpr double IN_ORDER = 0.75;      // part of the matches of a fundamental matrix, see keepsOrientation()
+constexpr double LEAST_CHANCE = 0.01;  // that a corner is found beside a plane
 constexpr double SEARCH_RADIUS = 4.0;  // around where a plane sends a corner [px]
 
 /** A plane that corners confirm. */
@@ -109,7 +111,9 @@ public:
     constexpr double LEAST = 6.0;  // significance
     const std::size_t seen = countSeen(corners_, h);
     const std::vector<GuidedMatch> matches = search(corners_, h);
-    const double significance = -logBinomialTail(seen, matches.size(), chanceBeside(h));
+    // What is found beside only lowers the significance: few planes need to be asked for it.
+    const bool maybe = -logBinomialTail(seen, matches.size(), LEAST_CHANCE) >= LEAST;
+    const double significance = maybe ? -logBinomialTail(seen, matches.size(), chanceBeside(h)) : 0.0;
     if (significance < LEAST)
     {
       return;
@@ -147,6 +151,10 @@ public:
   /** The best fundamental matrix, `other` being one that was found before; true if it stands without its best plane. */
   bool fit(const std::optional<Eigen::Matrix3d>& other, RansacStatistics& statistics)
   {
+    if (isBeyondDoubt(bestPlane()))
+    {
+      addMatchesNear(bestPlane()->h);
+    }
     if (pairs_.size() < MIN_MATCHES)
     {
       return false;
@@ -169,11 +177,6 @@ public:
     for (const Eigen::Matrix3d& hypothesis : hypotheses)
     {
       consider(hypothesis);
-    }
-    if (!holds() && matrix_ && isBeyondDoubt(bestPlane()))
-    {
-      addMatchesNear(bestPlane()->h);
-      consider(*std::exchange(matrix_, std::nullopt));
     }
     return holds();
   }
@@ -206,6 +209,15 @@ public:
       }
     }
     return 2 * unique.size() < all;
+  }
+
+  /** All that corners confirm. */
+  std::vector<Eigen::Matrix3d> planes() const
+  {
+    std::vector<Eigen::Matrix3d> result;
+    std::transform(planes_.begin(), planes_.end(), std::back_inserter(result),
+                   [](const Plane& plane) { return plane.h; });
+    return result;
   }
 
   /** The plane that corners confirm best, when it is beyond doubt and not mirrored. */
@@ -267,7 +279,7 @@ private:
   /** Whether the fundamental matrix is one that chance does not explain, also without its best plane. */
   bool holds() const
   {
-    return matrix_ && margin_ >= 0.0 && keepsOrientation(agreeing(*matrix_));
+    return matrix_ && margin_ >= 0.0 && keepsOrientation(agreeing(*matrix_), IN_ORDER);
   }
 
   std::vector<GuidedMatch> search(const std::vector<Corner>& corners, const Eigen::Matrix3d& h) const
@@ -275,10 +287,14 @@ private:
     return searchAlongHomography(reference_.grey(), corners, current_.grey(), h, SEARCH_RADIUS, guidance_);
   }
 
-  /** Corners off the planes that are seen not far from where one would show them: they say most of the parallax. */
+  /**
+   * Corners off the planes that are seen not far from where one would show them: they say most of the parallax. Each has
+   * to be found again from the current image, where something else looks more like it, it is not.
+   */
   void addMatchesNear(const Eigen::Matrix3d& h)
   {
     constexpr double RADIUS = 24.0;  // [px]
+    constexpr double SAME = 1.5;     // place [px]
     std::vector<Corner> others;
     for (std::size_t i = 0; i < corners_.size(); ++i)
     {
@@ -287,12 +303,24 @@ private:
         others.push_back(corners_[i]);
       }
     }
+    const std::vector<GuidedMatch> there =
+        searchAlongHomography(reference_.grey(), others, current_.grey(), h, RADIUS, guidance_);
+    std::vector<Corner> seen;
+    seen.reserve(there.size());
+    for (const GuidedMatch& match : there)
+    {
+      seen.push_back({ match.current, 0.0F });
+    }
     std::vector<MatchedPoint> near;
     for (const GuidedMatch& match :
-         searchAlongHomography(reference_.grey(), others, current_.grey(), h, RADIUS, guidance_))
+         searchAlongHomography(current_.grey(), seen, reference_.grey(), h.inverse(), RADIUS, guidance_))
     {
-      const Eigen::Vector2d& at = others[static_cast<std::size_t>(match.reference)].position;
-      near.push_back({ { at, match.current }, match.correlation, false });
+      const GuidedMatch& forth = there[static_cast<std::size_t>(match.reference)];
+      const Eigen::Vector2d& at = others[static_cast<std::size_t>(forth.reference)].position;
+      if ((match.current - at).norm() <= SAME)
+      {
+        near.push_back({ { at, forth.current }, forth.correlation, false });
+      }
     }
     std::stable_sort(near.begin(), near.end(),
                      [](const MatchedPoint& a, const MatchedPoint& b) { return a.score > b.score; });
@@ -315,7 +343,6 @@ private:
   /** The share of corners that are found when they are sought where the plane does not say. */
   double chanceBeside(const Eigen::Matrix3d& h) const
   {
-    constexpr double LEAST = 0.01;
     constexpr double BESIDE = 25.0;  // [px]
     constexpr std::size_t EVERY = 3;
     std::vector<Corner> some;
@@ -332,7 +359,7 @@ private:
       seen += countSeen(some, shift * h);
       found += search(some, shift * h).size();
     }
-    return seen > 0 ? std::max(LEAST, static_cast<double>(found) / static_cast<double>(seen)) : 1.0;
+    return seen > 0 ? std::max(LEAST_CHANCE, static_cast<double>(found) / static_cast<double>(seen)) : 1.0;
   }
 
   bool agrees(const Eigen::Matrix3d& f, const Correspondence& pair) const
@@ -401,29 +428,51 @@ private:
     return logSignificance(pairs_.size(), supporting.size(), FundamentalEstimator::SAMPLE_SIZE, chance);
   }
 
-  /** Keeps a fundamental matrix, or one of its best plane and the parallax off it, if that is the best so far. */
+  /**
+   * Keeps a fundamental matrix, or one of its best plane and the parallax off it, if that is the best so far. Where little
+   * lies far off the plane, what lies near it is told from it by half the threshold.
+   */
   void consider(const Eigen::Matrix3d& hypothesis)
   {
-    constexpr int SAMPLES = 1500;
-    Correspondences supporting = agreeing(hypothesis);
+    constexpr double FINE = 0.5;
+    const Correspondences supporting = agreeing(hypothesis);
     if (supporting.size() < MIN_MATCHES)
     {
       return;
     }
-    const Plane plane = bestPlaneOf(supporting);
-    const Parallax parallax(plane.h, pairs_, params_.inlier_threshold);
-    std::vector<Eigen::Matrix3d> choices{ polishFundamental(hypothesis, supporting, HUBER_WIDTH) };
+    Plane plane = bestPlaneOf(supporting);
+    weigh(hypothesis, plane, params_.inlier_threshold);
+    if (margin_ < 0.0)
+    {
+      const double tolerance = FINE * params_.inlier_threshold;
+      Correspondences near;
+      std::copy_if(supporting.begin(), supporting.end(), std::back_inserter(near),
+                   [&](const Correspondence& pair) { return sampsonError(hypothesis, pair) <= tolerance * tolerance; });
+      const auto h = view_servo::bestPlane(near, 2.0 * tolerance, rng_);
+      plane.h = h.value_or(plane.h);
+      weigh(hypothesis, plane, tolerance);
+    }
+  }
+
+  /** The same for one plane and tolerance. */
+  void weigh(const Eigen::Matrix3d& hypothesis, const Plane& plane, double tolerance)
+  {
+    constexpr int SAMPLES = 1500;
+    const double tests = std::log10(2.0);  // tolerances that may be tried
+    const Parallax parallax(plane.h, pairs_, tolerance);
+    std::vector<Eigen::Matrix3d> choices{ polishFundamental(hypothesis, agreeing(hypothesis), HUBER_WIDTH) };
     if (const auto of_plane = parallax.findFundamental(SAMPLES, rng_))
     {
-      supporting = agreeing(*of_plane);
-      choices.push_back(polishFundamental(*of_plane, supporting, HUBER_WIDTH));
+      choices.push_back(polishFundamental(*of_plane, agreeing(*of_plane), HUBER_WIDTH));
     }
     for (const Eigen::Matrix3d& choice : choices)
     {
-      const double held = parallax.significance(choice);
+      const double held = parallax.significance(choice) - tests;
       const double significance = significanceOf(choice);
-      // A plane that is beyond doubt and what its parallax says determine a fundamental matrix as well as all matches do.
-      const double evidence = isBeyondDoubt(&plane) ? std::max(significance, held) : significance;
+      // A plane that is beyond doubt and what its parallax says determine a fundamental matrix as well as all matches do;
+      // but what lies near a plane may be off it because the plane does not fit.
+      const bool off_plane = isBeyondDoubt(&plane) && tolerance >= params_.inlier_threshold;
+      const double evidence = off_plane ? std::max(significance, held) : significance;
       const double margin = std::min(held - params_.points.min_log_parallax, evidence - params_.min_log_significance);
       // Of those that hold, the one with which most matches agree.
       const std::size_t support = agreeing(choice).size();
@@ -635,8 +684,8 @@ ViewMatch SceneMatcher::match(const PreparedImage& reference, const PreparedImag
   const std::optional<Eigen::Matrix3d> plane = found ? std::nullopt : attempt.plane();
   const bool repeated = (found || plane) && params_.points.unique && attempt.isRepeated();
   clock.finish("unique");
-  const bool mirrored =
-      (found || plane) && !repeated && params_.points.refuse_mirrored && isMirrored(reference, 0, current, 0, 0.0, rng);
+  const bool mirrored = (found || plane) && !repeated && params_.points.refuse_mirrored &&
+                        isMirrored(reference, 0, current, 0, attempt.planes(), rng);
   clock.finish("mirror");
   const bool refused = repeated || mirrored;
   if (found && !refused)

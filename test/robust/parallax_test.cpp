@@ -153,4 +153,38 @@ TEST(Orientation, IsKeptByAViewAndLostInAMirror)
   EXPECT_FALSE(keepsOrientation(scene.pairs));
 }
 
+TEST(Orientation, IsKeptInMostPlacesByViewsOfASceneButNotAlongEpipolarLinesAtRandom)
+{
+  constexpr double PART = 0.75;
+  constexpr double PERIOD = 48.0;  // of a row of windows [px]
+  Rng rng(4);
+  Correspondences windows;
+  Correspondences scattered;
+  for (double v = 40.0; v < 440.0; v += PERIOD)
+  {
+    for (double u = 40.0; u < 600.0; u += PERIOD)
+    {
+      windows.push_back({ { u, v }, { u + 0.1 * v, v } });
+      // Of each window another one in its row: the epipolar line is the same.
+      scattered.push_back({ { u, v }, { 40.0 + PERIOD * static_cast<double>(uniformIndex(rng, 12)) + 0.1 * v, v } });
+    }
+  }
+  EXPECT_TRUE(keepsOrientation(windows, PART));
+  EXPECT_FALSE(keepsOrientation(scattered, PART));
+}
+
+TEST(Orientation, IsNotToldByTheSamePointMatchedAgain)
+{
+  // Ten matches of each of forty points, not quite the same: among themselves they turn either way.
+  Rng rng(5);
+  Correspondences pairs;
+  for (int i = 0; i < 400; ++i)
+  {
+    const Eigen::Vector2d at(60.0 * (i % 8), 60.0 * (i % 5));
+    const Eigen::Vector2d jitter(uniform(rng, -0.5, 0.5), uniform(rng, -0.5, 0.5));
+    pairs.push_back({ at + jitter, { at.x() + 20.0 + uniform(rng, -0.5, 0.5), at.y() + uniform(rng, -0.5, 0.5) } });
+  }
+  EXPECT_TRUE(keepsOrientation(pairs, 0.95));
+}
+
 }  // namespace view_servo

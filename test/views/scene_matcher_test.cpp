@@ -58,6 +58,32 @@ TEST(SceneMatcher, SaysThatAPlaneIsOne)
   EXPECT_LT(test::cornerError(result.matrix, h, test::PICTURE_SIZE), 0.5);
 }
 
+TEST(SceneMatcher, FindsTheFundamentalMatrixOfALowRelief)
+{
+  // Before a wall hangs a board; the camera moves sideways, and the board by 3 px more than the wall: one plane would
+  // explain all within 2 px.
+  constexpr double PARALLAX = 3.0;  // [px]
+  const cv::Rect board(180, 120, 300, 240);
+  Eigen::Matrix3d wall = Eigen::Matrix3d::Identity();
+  wall(0, 2) = -20.0;
+  const cv::Mat reference = test::texturedPicture(31, test::PICTURE_SIZE);
+  cv::Mat current = test::warpedPicture(reference, wall);
+  const Eigen::Vector2d moved(-20.0 + PARALLAX, 0.0);
+  reference(board).copyTo(current(board + cv::Point(static_cast<int>(moved.x()), 0)));
+  const ViewMatch result = test::matchScene(reference, test::disturbed(current, 1.0, 0.0, 1.0));
+  ASSERT_EQ(result.outcome, MatchOutcome::MATCHED) << result.message;
+  ASSERT_EQ(result.model, GeometryModel::FUNDAMENTAL) << result.message;
+  // What is still nearer moves in the same direction.
+  for (const double parallax : { 0.0, PARALLAX, 5.0 * PARALLAX })
+  {
+    for (const Eigen::Vector2d& at : { Eigen::Vector2d(100.0, 100.0), Eigen::Vector2d(500.0, 240.0) })
+    {
+      const Eigen::Vector2d seen = at + Eigen::Vector2d(-20.0 + parallax, 0.0);
+      EXPECT_LT(std::sqrt(sampsonError(result.matrix, { at, seen })), 1.0) << parallax << " px at " << at.transpose();
+    }
+  }
+}
+
 TEST(SceneMatcher, FindsTheBestPlaneWhereAHomographyIsAskedFor)
 {
   const test::RoomCorner room;
