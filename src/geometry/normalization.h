@@ -17,14 +17,15 @@ using Vector9d = Eigen::Matrix<double, 9, 1>;
 /** A similarity without rotation: p -> scale (p - centre). */
 struct Normalization
 {
-  Eigen::Vector2d centre;
-  double scale;
+  Eigen::Vector2d centre;  ///< in the units of the points
+  double scale;            ///< > 0
 
   Eigen::Vector2d operator()(const Eigen::Vector2d& point) const
   {
     return scale * (point - centre);
   }
 
+  /** The similarity as a matrix of homogeneous points. */
   Eigen::Matrix3d matrix() const
   {
     Eigen::Matrix3d t;

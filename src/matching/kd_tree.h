@@ -55,8 +55,8 @@ public:
   }
 
   /**
-   * The nearest, nearest first.
-   * @param tolerance one that is missed is at most (1 + tolerance) times nearer than the last of those found.
+   * Sets `found` to the `wanted` nearest vectors, nearest first; fewer when there are not so many.
+   * @param tolerance 0: exact; else each one found is at most 1 + tolerance times as far as the one that belongs there.
    */
   void findNearest(const float* query, std::size_t wanted, float tolerance, std::vector<Neighbour>& found) const
   {
@@ -80,7 +80,7 @@ public:
     return { index_.data() + nodes_[number].begin, index_.data() + nodes_[number].end };
   }
 
-  /** All nearer than a radius, nearest first. */
+  /** Sets `found` to all vectors nearer than a radius, nearest first. */
   void findWithin(const float* query, float radius, std::vector<Neighbour>& found) const
   {
     found.clear();
@@ -99,8 +99,8 @@ private:
 
   struct Bounds
   {
-    std::array<float, Columns> low;
-    std::array<float, Columns> high;
+    std::array<float, Columns> low;   // least number in each column
+    std::array<float, Columns> high;  // largest number in each column
   };
 
   /** Its left child is the next node. */

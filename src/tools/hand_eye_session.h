@@ -63,15 +63,17 @@ public:
   {
     return at_known_pose_;
   }
+  /** The stored view that is followed. */
   const HandEyeView& view() const
   {
     return view_;
   }
+  /** The poses taken so far, oldest first. */
   const std::vector<HandEyePose>& poses() const
   {
     return poses_;
   }
-  /** The frame of the images; empty until there is one. */
+  /** frame_id of the camera's images; empty until it is known. */
   const std::string& cameraFrame() const
   {
     return camera_frame_;
@@ -82,10 +84,12 @@ private:
   struct Received
   {
     Homography::ConstPtr message;
-    Clock::time_point time;
+    Clock::time_point time;  // when it came
   };
 
+  /** Takes one homography; whether a pose was added. */
   bool take(const Homography& message);
+  /** Whether a pose differs enough from all that were taken. */
   bool isNew(const HandEyePose& pose) const;
 
   HandEyeSources sources_;

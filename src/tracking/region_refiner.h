@@ -25,7 +25,7 @@ class RegionRefiner
 public:
   /**
    * @param reference 8-bit, one channel. @param region inside it that shows the plane [px].
-   * @param min_correlation of a block with what is seen in its place, for it to count, in [0, 1).
+   * @param min_correlation least correlation of a block with what is seen in its place for the block to count, in [0, 1).
    */
   RegionRefiner(const cv::Mat& reference, const cv::Rect& region, double min_correlation);
 
@@ -43,8 +43,8 @@ public:
   Eigen::Matrix3d refine(const cv::Mat& current, const Eigen::Matrix3d& h) const;
 
 private:
-  static constexpr int RADIUS = 10;  // of a block [px]
-  static constexpr int SIDE = 2 * RADIUS + 1;
+  static constexpr int RADIUS = 10;            // of a block [px]
+  static constexpr int SIDE = 2 * RADIUS + 1;  // of a block [px]
 
   /** A square of the stored view, small enough to be all of one light, with what its alignment needs. */
   struct Block
@@ -71,6 +71,7 @@ private:
   std::vector<SeenBlock> seenBlocks(const cv::Mat& current, const Eigen::Matrix3d& h) const;
   std::optional<SeenBlock> compare(const Block& block, const std::vector<float>& values) const;
   std::optional<Eigen::Matrix3d> solve(const std::vector<SeenBlock>& seen) const;
+  /** By how much a change moves the corner of the region that it moves most [px]. */
   double largestShift(const Eigen::Matrix3d& change) const;
 
   float min_correlation_;
