@@ -121,7 +121,7 @@ private:
     std::size_t wanted;
     std::vector<Neighbour>& found;
 
-    /** Only what is nearer can be of use [squared distance]. */
+    /** Only what is nearer is collected [squared distance]; infinite while fewer than `wanted` are. */
     float reach() const
     {
       return found.size() < wanted ? std::numeric_limits<float>::infinity() : found.back().squared_distance;
@@ -147,6 +147,7 @@ private:
     float squared_radius;
     std::vector<Neighbour>& found;
 
+    /** Only what is nearer is collected [squared distance]. */
     float reach() const
     {
       return squared_radius;
@@ -233,12 +234,14 @@ private:
     }
   }
 
+  /** Whether the query is nearer to the vectors left of the split than to those right of it, by the column of the split. */
   static bool leftIsNearer(const Node& node, const float* query)
   {
     const float value = query[static_cast<std::size_t>(node.column)];
     return value - node.left_high < node.right_low - value;
   }
 
+  /** Offers the vectors of a leaf that are in reach to the collector. */
   template <typename Collector>
   void takeLeaf(const Node& leaf, const float* query, Collector& collector) const
   {
@@ -261,6 +264,7 @@ private:
     }
   }
 
+  /** @param squared_factor cells count as this many times as far as they are, squared; 1: exact. */
   template <typename Collector>
   void search(const float* query, float squared_factor, Collector& collector) const
   {
@@ -279,6 +283,10 @@ private:
     descend(0, query, squared_factor, squared_distance, offsets, collector);
   }
 
+  /**
+   * Searches below a node, the nearer child first.
+   * @param squared_distance of the query from the node's cell. @param offsets its parts by column; the same after the call.
+   */
   template <typename Collector>
   void descend(std::size_t number, const float* query, float squared_factor, float squared_distance,
                std::array<float, Columns>& offsets, Collector& collector) const
@@ -308,7 +316,7 @@ private:
   std::vector<std::uint32_t> index_;                            // of the vectors, in the order of the leaves
   std::vector<Group, Eigen::aligned_allocator<Group>> groups_;  // the vectors in the same order
   std::vector<Node> nodes_;
-  Bounds bounds_{};
+  Bounds bounds_{};  // of all vectors
 };
 
 }  // namespace view_servo
