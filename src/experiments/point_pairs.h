@@ -23,7 +23,7 @@ struct PointPair
 {
   std::string name;
   cv::Mat reference;  ///< 8-bit grey
-  cv::Mat current;
+  cv::Mat current;    ///< likewise
   GeometryModel model;                                 ///< what relates the two images
   std::function<double(const Correspondence&)> error;  ///< of a match [px]; NaN where the point can have no match
   Correspondences points;                              ///< true matches, at which an estimated geometry is measured
