@@ -65,11 +65,16 @@ private:
     Vector8 right;     // its part in the right side of the normal equations
   };
 
+  /** The block whose upper left pixel is `corner`; empty when it has hardly any contrast. */
   std::optional<Block> makeBlock(const cv::Mat& image, const cv::Point& corner) const;
+  /** What a block adds to the matrix of the normal equations. */
   Matrix8 informationOf(const Block& block) const;
 
+  /** The blocks that the current image shows where h sends them, and that correlate enough with it. */
   std::vector<SeenBlock> seenBlocks(const cv::Mat& current, const Eigen::Matrix3d& h) const;
+  /** Compares a block with the grey values seen in its place; empty when they correlate too little. */
   std::optional<SeenBlock> compare(const Block& block, const std::vector<float>& values) const;
+  /** The change of the homography that fits the blocks best; empty when they do not determine it. */
   std::optional<Eigen::Matrix3d> solve(const std::vector<SeenBlock>& seen) const;
   /** By how much a change moves the corner of the region that it moves most [px]. */
   double largestShift(const Eigen::Matrix3d& change) const;

@@ -90,8 +90,8 @@ public:
 
 private:
   HeadingVoteParams params_;
-  double centre_ = 0.0;
-  double half_width_;
+  double centre_ = 0.0;  // [rad]
+  double half_width_;    // [rad]
 };
 
 }  // namespace view_servo

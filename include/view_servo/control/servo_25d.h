@@ -60,13 +60,17 @@ struct Servo25dError
 {
   Eigen::Vector2d point = Eigen::Vector2d::Zero();  ///< (x - x*, y - y*) of the chosen point, in normalised coordinates
   double depth = 0.0;  ///< log(Z / Z*) of the chosen point: its depth now over that in the stored view
-  Eigen::Vector3d rotation = Eigen::Vector3d::
-      Zero();  ///< θu, axis times angle: by it the camera is turned from where the view was stored [rad]
+  /**
+   * θu: axis times angle of the rotation that turns the camera from where the view was stored to where it is now [rad]. The
+   * axis has the same coordinates in the optical frames of both.
+   */
+  Eigen::Vector3d rotation = Eigen::Vector3d::Zero();
 };
 
-/** @param point the chosen point (x*, y*) of the stored view, in normalised coordinates. */
+/** The error after a motion. @param point the chosen point (x*, y*) of the stored view, in normalised coordinates. */
 Servo25dError servo25dError(const EuclideanHomography& motion, const Eigen::Vector2d& point);
 
+/** What servoing does. */
 enum class ServoState
 {
   ACQUIRING,  ///< the view has not been found yet
