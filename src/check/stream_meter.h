@@ -41,8 +41,8 @@ public:
   void fill(OdometryObservations& odometry) const;
 
 private:
-  std::vector<double> xs_;
-  std::vector<double> ys_;
+  std::vector<double> xs_;    // [m]
+  std::vector<double> ys_;    // [m]
   std::vector<double> yaws_;  // less the first one [rad]
   double first_yaw_ = 0.0;
 };
