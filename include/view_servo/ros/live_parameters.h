@@ -54,7 +54,7 @@ public:
   LiveParameters(const ros::NodeHandle& private_nh, std::vector<LiveNumber> numbers, Apply apply);
 
 private:
-  /** Takes over the numbers in `wanted`, each brought within its limits, and calls apply_ and publishes what is in effect. */
+  /** Takes over the numbers in `wanted`, each brought within its limits, and calls apply_. */
   void change(const dynamic_reconfigure::Config& wanted);
   /** The message with one member of each number: what is in effect, or the least or largest values. */
   dynamic_reconfigure::Config config(double LiveNumber::*value) const;
