@@ -82,15 +82,25 @@ def yaw_of_optical(q):
     return math.atan2(2 * (q.y * q.z - q.w * q.x), 2 * (q.x * q.z + q.w * q.y))
 
 
-def read_homing(bag):
-    """A mobile base's run; None without headings. Its times begin with the first heading, at "start" by the bag's clock."""
+def find_run(bag, message_type, name):
+    """
+    The topic that a run is known by, or None; all topics; and a function (message_type, name, columns) that reads the table
+    of another topic of the same run.
+    """
     topics = bag.get_type_and_topic_info().topics
-    topic = find_topic(topics, "view_servo/Heading", "heading")
-    if topic is None:
-        return None
+    topic = find_topic(topics, message_type, name)
 
     def table(message_type, name, columns):
         return read_table(bag, find_topic(topics, message_type, name, topic), columns)
+
+    return topic, topics, table
+
+
+def read_homing(bag):
+    """A mobile base's run; None without headings. Its times begin with the first heading, at "start" by the bag's clock."""
+    topic, topics, table = find_run(bag, "view_servo/Heading", "heading")
+    if topic is None:
+        return None
 
     heading = read_table(bag, topic, {
         "heading": lambda m: m.heading,
@@ -453,13 +463,9 @@ def draw_homing(run, name):
 
 def read_arm(bag):
     """An arm's run; None without errors of servoing. Its times begin with the first of them."""
-    topics = bag.get_type_and_topic_info().topics
-    topic = find_topic(topics, "view_servo/ServoError", "servo_error")
+    topic, _, table = find_run(bag, "view_servo/ServoError", "servo_error")
     if topic is None:
         return None
-
-    def table(message_type, name, columns):
-        return read_table(bag, find_topic(topics, message_type, name, topic), columns)
 
     def length(v):
         return math.hypot(v.x, v.y, v.z)

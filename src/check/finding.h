@@ -7,9 +7,10 @@
 
 namespace view_servo::check
 {
+/** How bad a finding is. */
 enum class Level
 {
-  OK,
+  OK,       ///< all is well
   WARNING,  ///< it may work, but worse than it could, or it cannot be told
   ERROR     ///< the nodes will refuse, or the robot will go wrong
 };
@@ -25,8 +26,11 @@ struct Finding
 
 using Findings = std::vector<Finding>;
 
+/** A finding of level OK, without a remedy. */
 Finding ok(const std::string& name, const std::string& message);
+/** A finding of level WARNING. Arguments as the members of Finding. */
 Finding warning(const std::string& name, const std::string& message, const std::string& remedy);
+/** A finding of level ERROR. Arguments as the members of Finding. */
 Finding error(const std::string& name, const std::string& message, const std::string& remedy);
 
 /** The exit status: 0 all is well, 1 there are warnings, 2 there are errors. */

@@ -8,7 +8,8 @@
 namespace view_servo::check
 {
 /** @file
- * What measured numbers mean for homing and servoing, and what to do: one finding a line.
+ * What measured numbers mean for homing and servoing, and what to do. Each function returns a finding for each name in its
+ * comment; such a name is Finding::name.
  */
 
 /** "images", "picture", "sharpness", "camera_info", "calibration", "image stamps". */

@@ -7,7 +7,7 @@
 
 namespace view_servo::check
 {
-/** What is left of this computer's processors from the construction on. Linux. */
+/** Measures how much of this computer's processors is idle, from the object's construction on. Linux only. */
 class ProcessorMeter
 {
 public:
@@ -15,13 +15,14 @@ public:
 
   /** Cores that were idle, on average; NaN when the system does not tell. */
   double idleCores() const;
+  /** Number of cores. */
   static int cores();
 
 private:
   struct Ticks
   {
-    double idle = 0.0;
-    double all = 0.0;
+    double idle = 0.0;  // idle time of all cores since the computer started, in the system's units
+    double all = 0.0;   // all time of all cores, likewise
   };
   static Ticks read();
 
@@ -32,7 +33,7 @@ private:
 struct DiskSpace
 {
   std::string fault;  ///< why nothing could be written there, in one line; empty: it could
-  double free = 0.0;  ///< [bytes]
+  double free = 0.0;  ///< space that is free [bytes]
 };
 DiskSpace diskSpace(const std::filesystem::path& directory);
 

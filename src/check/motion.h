@@ -21,7 +21,7 @@ namespace view_servo::check
  */
 struct Motion
 {
-  Eigen::Vector3d translation = Eigen::Vector3d::Zero();  ///< [m]; what images say has a length of 1, or is zero
+  Eigen::Vector3d translation = Eigen::Vector3d::Zero();  ///< [m]; by images it has length 1, or is zero
   Eigen::Vector3d rotation = Eigen::Vector3d::Zero();     ///< axis times angle [rad]
 };
 
@@ -32,10 +32,10 @@ Motion toMotion(const PlanarPose& after_in_before);
 /** What two images say of the motion between them. */
 struct SeenMotion
 {
-  std::optional<Motion> motion;
-  int matches = 0;     ///< that agree with it
-  double shift = 0.0;  ///< median distance that these moved in the image [px]
-  std::string fault;   ///< why there is none
+  std::optional<Motion> motion;  ///< empty: the images do not tell one
+  int matches = 0;               ///< number of matches that agree with the motion
+  double shift = 0.0;            ///< median distance by which these moved in the image [px]
+  std::string fault;             ///< why there is no motion, in one line; empty: there is one
 };
 
 /** Two images of one camera, 8-bit grey. */
@@ -46,11 +46,15 @@ struct ImagePair
   Camera camera;
 };
 
-/** Of a base on a level floor. @param measured the motion by odometry: its length puts the camera's place on the base right. */
+/**
+ * The motion of a base on a level floor. Images tell the camera's motion but not its length.
+ * @param measured pose of the base after the motion in the base before it, by odometry [m, rad]. The length of its way is
+ * taken for the camera's, so that the base's motion follows from where the camera is mounted.
+ */
 SeenMotion seenByBase(const ImagePair& images, const CameraMount& mount, const PlanarPose& measured);
 
 /**
- * Of a camera, by the homography of the plane that most matches lie on. Two motions explain a homography; the one nearer
+ * The motion of a camera in an arm's hand, by the homography of the plane that most matches lie on. Two motions explain a homography; the one nearer
  * to `measured` is taken. Where none is possible and a turn explains the matches, the camera has turned alone.
  */
 SeenMotion seenByHand(const ImagePair& images, const Motion& measured);
@@ -59,12 +63,12 @@ SeenMotion seenByHand(const ImagePair& images, const Motion& measured);
 struct Leg
 {
   std::string name;         ///< "forward", for example
-  bool turns = false;       ///< else it is a translation
+  bool turns = false;       ///< whether it is a turn; if not, it is a translation
   Motion asked;             ///< what was commanded, or what somebody was asked to do by hand
-  bool by_hand = false;     ///< only roughly as asked
+  bool by_hand = false;     ///< somebody moved the robot by hand, so only roughly as asked
   std::string measured_by;  ///< "odometry" or "tf"
-  Motion measured;
-  SeenMotion seen;
+  Motion measured;          ///< the motion by that
+  SeenMotion seen;          ///< the motion by the images before and after it
 };
 
 /**

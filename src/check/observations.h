@@ -18,6 +18,7 @@ namespace view_servo::check
  * there is none. Topics are named as other nodes see them.
  */
 
+/** What a number is that was not measured. */
 constexpr double UNKNOWN = std::numeric_limits<double>::quiet_NaN();
 
 constexpr double INPUT_TIMEOUT = 0.25;  ///< a base stands when an input pauses for longer: the nodes' default [s]
@@ -29,28 +30,28 @@ struct StreamObservations
   std::string publisher;       ///< a node that publishes it, by the master; empty: there is none
   int count = 0;               ///< messages that came
   double rate = 0.0;           ///< [Hz]; 0 when fewer than two came
-  double usual_gap = UNKNOWN;  ///< longest time between two messages but for one in twenty [s]
+  double usual_gap = UNKNOWN;  ///< time from one message to the next that 19 of 20 keep within [s]
   double age = UNKNOWN;        ///< median time from stamp to arrival, by this computer's clock [s]
   double late_share = 0.0;     ///< part of the messages that came after one with a newer stamp
-  std::string stamp_fault;
+  std::string stamp_fault;     ///< of the last message's stamp
 };
 
 struct CameraObservations
 {
   StreamObservations images;
   StreamObservations infos;
-  int pairs = 0;  ///< images that a camera_info with the same stamp came with
-  int width = 0;  ///< of the images [px]
-  int height = 0;
-  std::string encoding;
-  std::string frame;          ///< frame_id of the images; may be empty
-  std::string image_fault;    ///< why an image cannot be read
-  std::string pairing_fault;  ///< why images and camera_info do not come together
-  std::string calibration_fault;
-  std::string age_fault;          ///< of the newest image
-  std::string model;              ///< of the lens
-  double focal_length = UNKNOWN;  ///< [px]
-  std::optional<PictureMeasures> picture;
+  int pairs = 0;                           ///< images that a camera_info with the same stamp came with
+  int width = 0;                           ///< of the images [px]
+  int height = 0;                          ///< likewise
+  std::string encoding;                    ///< of the images
+  std::string frame;                       ///< frame_id of the images; may be empty
+  std::string image_fault;                 ///< why an image cannot be read
+  std::string pairing_fault;               ///< why images and camera_info do not come together
+  std::string calibration_fault;           ///< what is wrong with the newest camera_info
+  std::string age_fault;                   ///< of the newest image
+  std::string model;                       ///< of the lens
+  double focal_length = UNKNOWN;           ///< [px]
+  std::optional<PictureMeasures> picture;  ///< of the newest image; empty: none can be read
 };
 
 /** Where tf has the camera on the robot. */
@@ -60,7 +61,7 @@ struct MountObservations
   std::string camera_frame;
   std::string fault;            ///< why tf does not know the camera at all
   std::string fault_at_images;  ///< why tf does not know it at the stamps of most images
-  bool is_static = false;       ///< all transforms between the two are
+  bool is_static = false;       ///< all transforms between the two frames are static
   double age = UNKNOWN;         ///< of the newest transform [s]
   std::string mount_fault;      ///< why a base's camera cannot be used as it is mounted
   Eigen::Isometry3d base_from_camera = Eigen::Isometry3d::Identity();  ///< points of the camera's frame -> base
@@ -74,19 +75,19 @@ struct OdometryObservations
   std::string fault;
   std::string apart_fault;          ///< why its stamps do not go with those of the images
   double moved = UNKNOWN;           ///< largest distance from the first pose [m]
-  double turned = UNKNOWN;          ///< likewise [rad]
-  double position_noise = UNKNOWN;  ///< standard deviation [m]
-  double yaw_noise = UNKNOWN;       ///< likewise [rad]
+  double turned = UNKNOWN;          ///< largest angle from the first yaw [rad]
+  double position_noise = UNKNOWN;  ///< standard deviation of the position at rest [m]
+  double yaw_noise = UNKNOWN;       ///< standard deviation of the yaw at rest [rad]
 };
 
 struct CommandObservations
 {
   std::string topic;
-  std::string wanted_type;              ///< of the messages that drivers publish
-  std::string type;                     ///< of the topic, by the master; empty: nobody has said it
-  std::vector<std::string> listeners;   ///< nodes
-  std::vector<std::string> publishers;  ///< nodes other than the driver
-  bool dry_run = false;
+  std::string wanted_type;              ///< type of the messages that drivers publish
+  std::string type;                     ///< type of the topic's messages, by the master; empty: it knows none
+  std::vector<std::string> listeners;   ///< nodes that subscribe
+  std::vector<std::string> publishers;  ///< nodes that publish there, other than the driver
+  bool dry_run = false;                 ///< the driver is to run dry, so that nobody need listen
 };
 
 struct JointObservations
@@ -95,19 +96,19 @@ struct JointObservations
   bool described = false;            ///< there is a robot_description with joints that move
   std::vector<std::string> unknown;  ///< joints of the messages that the URDF does not have
   std::vector<std::string> silent;   ///< joints of the URDF that no message has
-  std::string fault;                 ///< of positions beside the URDF's limits
+  std::string fault;                 ///< which position lies beyond the URDF's limits
 };
 
 struct MachineObservations
 {
   bool sim_time = false;         ///< use_sim_time is set
   bool clock_published = false;  ///< somebody publishes /clock
-  double clock_rate = 1.0;       ///< seconds of ROS' clock in a second
-  std::string views_dir;
-  std::string disk_fault;      ///< why no view could be written
-  double disk_free = UNKNOWN;  ///< [bytes]
-  int cores = 0;
-  double cores_idle = UNKNOWN;  ///< on average
+  double clock_rate = 1.0;       ///< seconds by which ROS' clock goes on in a second
+  std::string views_dir;         ///< directory of the stored views
+  std::string disk_fault;        ///< why no view could be written
+  double disk_free = UNKNOWN;    ///< [bytes]
+  int cores = 0;                 ///< number of cores
+  double cores_idle = UNKNOWN;   ///< how many of them were idle, on average
 };
 
 }  // namespace view_servo::check

@@ -16,8 +16,8 @@ struct PictureMeasures
   double brightness = 0.0;                                       ///< mean [grey levels]
   double overexposed = 0.0;                                      ///< part of the pixels that are white
   double edge_width = std::numeric_limits<double>::quiet_NaN();  ///< see edgeWidth() [px]; NaN: it shows no edges
-  int corners = 0;
-  int segments = 0;
+  int corners = 0;                                               ///< number of corners
+  int segments = 0;                                              ///< number of line segments
 };
 
 /**
@@ -27,7 +27,7 @@ struct PictureMeasures
  */
 double edgeWidth(const cv::Mat& grey);
 
-/** Features are those that the nodes find with their default parameters. @param grey 8-bit, one channel. */
+/** Measures a picture; its corners and segments are those that the nodes find by their default parameters. @param grey 8-bit, one channel. */
 PictureMeasures measurePicture(const cv::Mat& grey);
 
 /** The picture, BGR, with its corners as dots and its segments as lines, and a line of text below. */

@@ -15,18 +15,19 @@ public:
   /** @param age time from the message's stamp to now, by this computer's clock [s]. @param late a newer stamp has come before. */
   void add(double time, double age, bool late);
 
-  /** Fills in count, rate, gap, age and share of late messages. */
+  /** Sets count, rate, usual_gap, age and late_share. */
   void fill(StreamObservations& stream) const;
 
+  /** Number of messages. */
   int count() const
   {
     return static_cast<int>(times_.size());
   }
 
 private:
-  std::vector<double> times_;
-  std::vector<double> ages_;
-  int late_ = 0;
+  std::vector<double> times_;  // when messages came [s]
+  std::vector<double> ages_;   // of the messages [s]
+  int late_ = 0;               // number of late messages
 };
 
 /** Where a base is while it should stand still: how far it went, and how much single readings differ from the mean. */
@@ -40,9 +41,9 @@ public:
   void fill(OdometryObservations& odometry) const;
 
 private:
-  std::vector<double> xs_;
-  std::vector<double> ys_;
-  std::vector<double> yaws_;  // from the first on
+  std::vector<double> xs_;    // [m]
+  std::vector<double> ys_;    // [m]
+  std::vector<double> yaws_;  // less the first one [rad]
   double first_yaw_ = 0.0;
 };
 

@@ -30,7 +30,7 @@ class CameraListener
 public:
   CameraListener(const ros::NodeHandle& nh, const Setup& setup);
 
-  /** What came until now. */
+  /** What came until now. @param duration time since the construction [s]. */
   CameraObservations observations(const RosGraph& graph, double duration) const;
 
   /** The newest image that came with a calibration of its stamp, if there is one. */
@@ -45,7 +45,7 @@ public:
   double silence() const;
   /** Number of images that have come. */
   int count() const;
-  /** See stampsApart(). */
+  /** What stampsApart() says of odometry's and these images' stamps: why they do not go together; else empty. */
   std::string apart(const DriverInput& odometry) const;
 
   const CameraTopics& topics() const
@@ -61,15 +61,15 @@ private:
 
   CameraTopics topics_;
   mutable std::mutex mutex_;  // guards what follows, up to the transport
-  DriverInput input_;
-  std::string stamp_fault_;  // of the last image
+  DriverInput input_;         // of the images, by whose stamps they are judged
+  std::string stamp_fault_;   // of the last image
   StreamMeter images_;
   StreamMeter infos_;
   std::deque<CameraImageConstPtr> last_images_;
   std::deque<sensor_msgs::CameraInfoConstPtr> last_infos_;
-  double last_time_;
-  std::optional<CameraFrame> frame_;
-  int pairs_ = 0;
+  double last_time_;                  // when the last image came, by a steady clock [s]
+  std::optional<CameraFrame> frame_;  // see frame()
+  int pairs_ = 0;                     // images that came with a camera_info of the same stamp
 
   CameraImageSubscriber image_subscriber_;
   ros::Subscriber info_subscriber_;

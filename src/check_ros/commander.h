@@ -44,9 +44,11 @@ public:
 
 private:
   void publish(const Twist& velocity);
+  /** Takes note of a command that a node has sent. */
   void onCommand(const std::string& publisher);
   /** A node that commands the robot besides; empty: there is none. */
   std::string rival() const;
+  /** drive() without the zeros at its end. */
   std::string follow(const Twist& way, const std::function<std::string()>& objection);
   void sendZeros();
 

@@ -18,7 +18,7 @@
 
 namespace view_servo::check
 {
-/** Listens to a robot's topics from the construction on, and says what is there, fits, and what does not. Publishes nothing. */
+/** Listens to a robot's topics from the construction on, and says what is there and what does not fit. Publishes nothing. */
 class RobotCheck
 {
 public:
@@ -30,7 +30,7 @@ public:
    */
   static void listen(double duration, const std::function<bool()>& given_up);
 
-  /** By what came until now. */
+  /** What is right or wrong, by what came until now. */
   Findings findings() const;
 
   /** The camera's newest picture with its corners and segments, BGR; empty when none came that can be read. */
@@ -52,7 +52,7 @@ public:
   {
     return camera_;
   }
-  /** Null for an arm. */
+  /** The base's odometry; null for an arm. */
   OdometryListener* odometry() const
   {
     return odometry_.get();
@@ -63,8 +63,8 @@ private:
 
   const ros::NodeHandle nh_;
   const Setup setup_;
-  const double begin_;      // by a steady clock [s]
-  const double ros_begin_;  // by ROS' clock [s]
+  const double begin_;      // time of the construction by a steady clock [s]
+  const double ros_begin_;  // time of the construction by ROS' clock [s]
   ProcessorMeter processor_;
   TransformSource transforms_;
   CameraListener camera_;

@@ -26,7 +26,7 @@
 
 namespace view_servo::check
 {
-/** Listens to a base's odometry, by what homing does with it. Safe to use from several threads. */
+/** Listens to a base's odometry, and judges it as homing does. Safe to use from several threads. */
 class OdometryListener
 {
 public:
@@ -38,6 +38,7 @@ public:
 
   /** Pose of `base_frame` in odometry's frame; empty where nothing is known. @param stamp of an image [s]. */
   std::optional<PlanarPose> at(double stamp) const;
+  /** The newest pose of `base_frame` in odometry's frame; empty before the first. */
   std::optional<PlanarPose> newest() const;
   /** Time since the last odometry that could be used came [s]; infinite before the first. */
   double silence() const;
@@ -68,13 +69,13 @@ private:
   std::string stamp_fault_;  // likewise
   std::string apart_fault_;
   int compared_images_ = 0;  // that had come at the last comparison with them
-  int comparisons_ = 0;
-  int apart_ = 0;  // comparisons that stampsApart() objected to
-  double last_time_;
+  int comparisons_ = 0;      // of stamps with those of images
+  int apart_ = 0;            // comparisons that stampsApart() objected to
+  double last_time_;         // when usable odometry came last, by a steady clock [s]
   ros::Subscriber subscriber_;
 };
 
-/** Listens to an arm's joints, by what servo_25d does with them. Safe to use from several threads. */
+/** Listens to an arm's joints, and judges them as servo_25d does. Safe to use from several threads. */
 class JointListener
 {
 public:
@@ -86,16 +87,16 @@ private:
   void onJoints(const sensor_msgs::JointState& message);
 
   const std::string topic_;
-  const std::set<std::string> described_;
-  mutable std::mutex mutex_;  // guards what follows
+  const std::set<std::string> described_;  // movable joints of robot_description
+  mutable std::mutex mutex_;               // guards what follows
   JointGuard guard_;
   StreamMeter meter_;
-  std::set<std::string> names_;
-  std::string fault_;  // of the last message
+  std::set<std::string> names_;  // joints that messages have named
+  std::string fault_;            // of the last message
   ros::Subscriber subscriber_;
 };
 
-/** Where tf has the camera, by what homing and homography_tracker ask of it. */
+/** Where tf has the camera, asked as homing and homography_tracker ask. */
 MountObservations observeMount(const Setup& setup, const TransformSource& transforms, const CameraListener& camera);
 
 /** Who listens to commands. */

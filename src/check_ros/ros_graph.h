@@ -15,8 +15,9 @@ public:
   /** Asks the master. Nothing is known when it does not answer. */
   RosGraph();
 
-  /** @param topic fully resolved. */
+  /** Names of the nodes that publish a topic; none when nobody does. @param topic fully resolved, here and below. */
   std::vector<std::string> publishers(const std::string& topic) const;
+  /** Names of the nodes that subscribe to a topic; none when nobody does. */
   std::vector<std::string> subscribers(const std::string& topic) const;
   /** One of the nodes that publish a topic; empty: there is none. */
   std::string publisher(const std::string& topic) const;

@@ -9,15 +9,15 @@ namespace view_servo::check
 /** The arguments of homing.launch or arm_servo.launch that say how a robot is wired, with their names and defaults. */
 struct Setup
 {
-  bool is_arm = false;
+  bool is_arm = false;  // arguments are those of arm_servo.launch
   std::string camera = "camera";
   std::string image_transport = "raw";
-  std::string odom = "odom";                  // a base's
-  std::string joint_states = "joint_states";  // an arm's
+  std::string odom = "odom";                  // of a base
+  std::string joint_states = "joint_states";  // of an arm
   std::string cmd_vel = "cmd_vel";
-  std::string base_frame = "base_link";  // a base's
-  std::string odom_frame = "base_link";  // an arm's; empty: do without
-  std::string frame_prefix;              // of simulated robots
+  std::string base_frame = "base_link";  // of a base
+  std::string odom_frame = "base_link";  // of an arm, the frame that it stands in; empty: do without tf
+  std::string frame_prefix;              // put before frames of simulated robots
   std::string views_dir;
   bool dry_run = false;
 
@@ -28,10 +28,12 @@ struct Setup
     const std::string prefix = frame_prefix.substr(0, frame_prefix.find_last_not_of('/') + 1);
     return frame.empty() || prefix.empty() ? frame : prefix + "/" + frame;
   }
+  /** Topic that the driver publishes commands on, before resolving. */
   std::string commandTopic() const
   {
     return dry_run ? "cmd_vel_dry" : cmd_vel;
   }
+  /** Type of the messages on it. */
   std::string commandType() const
   {
     return is_arm ? "geometry_msgs/TwistStamped" : "geometry_msgs/Twist";

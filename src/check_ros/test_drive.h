@@ -18,8 +18,8 @@ namespace view_servo::check
 /** How far the robot is to move. */
 struct DriveParams
 {
-  double distance = 0.1;             ///< [m], (0, 0.2]
-  double angle = 10.0 * M_PI / 180;  ///< [rad], (0, 15 degrees]
+  double distance = 0.1;             ///< length of each straight part [m], (0, 0.2]
+  double angle = 10.0 * M_PI / 180;  ///< angle of each turn [rad], above 0, 15 degrees at most
 };
 
 /**
@@ -35,10 +35,13 @@ public:
   /** @param given_up as in RobotCheck::listen(). `robot` must outlive the drive. */
   TestDrive(const RobotCheck& robot, const DriveParams& params, std::function<bool()> given_up);
 
-  /** Why the robot must not be driven; empty: it may. @param findings of listening. @param by_hand without commands. */
+  /**
+   * Why the robot must not be moved; empty: it may. @param findings what RobotCheck found. @param by_hand whether somebody
+   * moves it, without commands.
+   */
   std::string refusal(const Findings& findings, bool by_hand) const;
 
-  /** What will be done, for the question whether it may be. */
+  /** What drive() will do, in words, for the question whether it may. */
   std::string plan() const;
 
   /** The robot drives by itself. */
@@ -52,7 +55,7 @@ private:
   {
     std::string name;
     std::string back;  ///< name of the same way back
-    Twist way;         ///< [m], [rad]
+    Twist way;         ///< translation [m] and rotation vector [rad], as Commander::drive() takes them
   };
   /** An image and where the robot was then. */
   struct Place
@@ -76,13 +79,13 @@ private:
   std::string objection(const std::optional<PlanarPose>& begin);
   /** Drives one way and judges it. @return false when the drive cannot go on. */
   bool driveLeg(Commander& commander, Place& here, const std::string& name, const Twist& way, Findings& findings);
-  /** How far odometry's and the images' stamps are apart, by a turn in `trace_`. @param before where it began. */
+  /** How far odometry's and the images' stamps are apart, by a turn in `trace_`. @param before the image when it began. */
   Finding judgeClocks(const CameraFrame& before) const;
 
   const RobotCheck& robot_;
   const DriveParams params_;
   const std::function<bool()> given_up_;
-  std::vector<CameraFrame> trace_;  // of the present part
+  std::vector<CameraFrame> trace_;  // images of the part that is driven
 };
 
 }  // namespace view_servo::check

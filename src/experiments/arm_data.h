@@ -17,18 +17,18 @@ namespace view_servo
 /** An image of the board, and where the arm held the camera. */
 struct ArmView
 {
-  Eigen::Isometry3d hand_in_base;    ///< by the joints [m]
-  Eigen::Isometry3d camera_in_base;  ///< likewise, with ArmData::camera_in_hand [m]
+  Eigen::Isometry3d hand_in_base;    ///< pose of the hand by the joints [m]
+  Eigen::Isometry3d camera_in_base;  ///< pose of the camera by the joints and ArmData::camera_in_hand [m]
   Points corners;                    ///< of the board [px], in the order of board()
 };
 
 /** What eyeinhand_franka_visp holds: a chessboard, seen by a camera on the hand of a real arm. */
 struct ArmData
 {
-  static constexpr int ROWS = 6;  ///< of the board's corners, which are in the order of rows
-  static constexpr int COLUMNS = 9;
-  static constexpr std::size_t CORNERS = ROWS * COLUMNS;
-  static constexpr double SQUARE = 0.0236;  ///< [m]
+  static constexpr int ROWS = 6;     ///< rows of the board's corners, which are in the order of rows
+  static constexpr int COLUMNS = 9;  ///< corners in a row
+  static constexpr std::size_t CORNERS = ROWS * COLUMNS;  ///< number of corners
+  static constexpr double SQUARE = 0.0236;                ///< side of the board's squares [m]
 
   Camera camera;
   Eigen::Isometry3d camera_in_hand = Eigen::Isometry3d::Identity();  ///< as the data have it [m]

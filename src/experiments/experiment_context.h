@@ -11,10 +11,10 @@ namespace view_servo
 /** What an experiment does again and again with new random numbers. */
 struct Repetition
 {
-  const char* what;    ///< is repeated, in the plural; empty when there are random numbers, but nothing is repeated
-  int runs;            ///< how often, unless told otherwise; 0 when nothing is repeated
-  int brief_runs;      ///< the same for the brief form
-  std::uint64_t seed;  ///< that the tables of docs/results/ were made with
+  const char* what;    ///< what is repeated, in the plural; empty: nothing is, though random numbers are drawn
+  int runs;            ///< how often it is repeated unless `--runs` is given; 0 when nothing is repeated
+  int brief_runs;      ///< how often in the brief form
+  std::uint64_t seed;  ///< the seed that the tables of docs/results/ were made with
 };
 
 /** What an experiment is given. */
@@ -22,11 +22,11 @@ struct ExperimentContext
 {
   std::filesystem::path data;  ///< real images, for experiments that need them
   bool brief = false;          ///< do a small part only
-  int threads = 0;             ///< use at most this many; 0: as many as there are processors
+  int threads = 0;             ///< largest number of threads to use; 0: as many as there are processors
   int runs = 0;                ///< how often to repeat what is repeated; 0: as often as the experiment does by itself
   std::optional<std::uint64_t> seed;  ///< from which all random numbers are drawn; empty: that of the experiment
 
-  /** How often this is repeated. */
+  /** How often to repeat it. */
   int runsOf(const Repetition& repetition) const
   {
     return runs > 0 ? runs : brief ? repetition.brief_runs : repetition.runs;

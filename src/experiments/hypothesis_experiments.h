@@ -18,7 +18,7 @@ constexpr Repetition HYPOTHESIS_SCENES{ "scenes", 20, 3, 1 };
  */
 void runMultiHypothesisExperiment(const ExperimentContext& context, std::ostream& csv);
 
-/** Runs of each algorithm on each pair, with other samples. */
+/** Runs of each algorithm on each pair; each run draws other samples. */
 constexpr Repetition REAL_PAIR_RUNS{ "runs of each algorithm on each pair", 20, 3, 1 };
 
 /**

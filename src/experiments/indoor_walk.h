@@ -22,9 +22,9 @@ struct IndoorWalk
   {
     std::string reference;
     std::string current;
-    double baseline;  ///< [m]
-    double rotation;  ///< [degrees]
-    double overlap;   ///< share of the image that the other one shows, too
+    double baseline;  ///< distance between the two places of the camera [m]
+    double rotation;  ///< angle between its two orientations [degrees]
+    double overlap;   ///< share of the one image that the other one shows, too, [0, 1]
   };
   std::vector<Pair> pairs;  ///< each in both directions, one after the other
 };

@@ -23,13 +23,14 @@ struct PointPair
 {
   std::string name;
   cv::Mat reference;  ///< 8-bit grey
-  cv::Mat current;
+  cv::Mat current;    ///< likewise
   GeometryModel model;                                 ///< what relates the two images
   std::function<double(const Correspondence&)> error;  ///< of a match [px]; NaN where the point can have no match
   Correspondences points;                              ///< true matches, at which an estimated geometry is measured
 
-  /** Whether a match is within 4 px of the truth. */
+  /** Whether the error of a match is at most 4 px. */
   bool isCorrect(const Correspondence& match) const;
+  /** Number of matches that are correct. */
   int countCorrect(const Correspondences& matches) const;
   /** Mean error of a homography (transfer) or fundamental matrix (Sampson) at `points` [px]; NaN for a NaN matrix. */
   double geometryError(GeometryModel kind, const Eigen::Matrix3d& matrix) const;

@@ -8,6 +8,7 @@ namespace view_servo
 {
 /** @file Statistics of the rows of tables. All take at least one value. */
 
+/** Arithmetic mean. */
 double mean(const std::vector<double>& values);
 
 /** Standard deviation of the values themselves: the sum of squares is divided by their number. */

@@ -14,11 +14,11 @@ namespace view_servo
  * compiler seconds.
  */
 
-/** Of a symmetric matrix. */
+/** Eigenvalues and eigenvectors of a symmetric matrix. */
 struct SymmetricEigen
 {
-  Vector9d values;   ///< in ascending order
-  Matrix9d vectors;  ///< columns
+  Vector9d values;   ///< eigenvalues in ascending order
+  Matrix9d vectors;  ///< unit eigenvectors in the same order, one a column
 };
 
 /** @return NaN where the matrix has entries that are not finite. */
@@ -63,7 +63,7 @@ public:
 
   Eigen::MatrixXd inverse() const;
 
-  /** Of D. */
+  /** The diagonal of D. */
   Eigen::VectorXd diagonal() const;
 
 private:
@@ -76,10 +76,10 @@ Eigen::VectorXd solveSymmetric(const Eigen::MatrixXd& a, const Eigen::VectorXd& 
 /** L⁻¹ of a covariance L Lᵀ that is positive definite: errors times it have a covariance of identity. */
 Eigen::MatrixXd whiteningOf(const Eigen::MatrixXd& covariance);
 
-/** a b. */
+/** The product a b. */
 Eigen::MatrixXd product(const Eigen::MatrixXd& a, const Eigen::MatrixXd& b);
 
-/** a x. */
+/** The product a x. */
 Eigen::VectorXd applied(const Eigen::MatrixXd& a, const Eigen::VectorXd& x);
 
 }  // namespace view_servo

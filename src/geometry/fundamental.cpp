@@ -11,7 +11,6 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <iterator>
 #include <limits>
 #include <utility>
 
@@ -322,20 +321,15 @@ std::optional<Eigen::Matrix3d> fundamentalFromPoints(const Correspondences& pair
 Eigen::Matrix3d refineFundamental(const Eigen::Matrix3d& initial, const Correspondences& pairs, double huber_width,
                                   int max_iterations)
 {
-  Correspondences usable;
-  usable.reserve(pairs.size());
-  std::copy_if(pairs.begin(), pairs.end(), std::back_inserter(usable),
-               [&](const Correspondence& pair) { return std::isfinite(sampsonError(initial, pair)); });
-  const auto normalization = commonNormalization(usable);
-  if (usable.size() < 7 || !normalization)
+  auto usable = refinablePairs(pairs, 7, [&](const Correspondence& pair) { return sampsonError(initial, pair); });
+  if (!usable)
   {
     return initial;
   }
-  std::transform(usable.begin(), usable.end(), usable.begin(), *normalization);
-  const FundamentalProblem problem(std::move(usable), huber_width * normalization->current.scale);
-  Orthonormal f(normalization->current.inverseMatrix().transpose() * initial *
-                normalization->reference.inverseMatrix());
-  return levenbergMarquardt(problem, f, max_iterations) ? denormalized(f.matrix(), *normalization) : initial;
+  const auto& [reference, current] = usable->normalization;
+  const FundamentalProblem problem(std::move(usable->pairs), huber_width * current.scale);
+  Orthonormal f(current.inverseMatrix().transpose() * initial * reference.inverseMatrix());
+  return levenbergMarquardt(problem, f, max_iterations) ? denormalized(f.matrix(), usable->normalization) : initial;
 }
 
 Eigen::Vector3d currentEpipole(const Eigen::Matrix3d& f)

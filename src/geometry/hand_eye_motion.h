@@ -17,13 +17,13 @@ void check(const HandEyeView& view, const std::vector<HandEyePose>& poses);
 /** As handEyeMotion(). @param normal of the plane; NaN: not known. */
 HandEyeMotion motionOf(const Problem& problem, const std::vector<HandEyePose>& poses, const Eigen::Vector3d& normal);
 
-/** Likewise, of the normal on which most homographies agree. */
+/** The same with the normal on which most homographies agree. */
 HandEyeMotion motionOf(const Problem& problem, const std::vector<HandEyePose>& poses);
 
-/** A number as people read it. */
+/** A number with this many digits after the point, as people read it. */
 std::string rounded(double value, int decimals = 1);
 
-/** Of a rotation [rad]. */
+/** The angle of a rotation [rad], [0, pi]. */
 double angleOf(const Eigen::Matrix3d& rotation);
 
 }  // namespace view_servo::hand_eye

@@ -18,23 +18,23 @@ namespace view_servo
 /** What the parts of calibrateHandEye() share. */
 namespace hand_eye
 {
-constexpr double NONE = std::numeric_limits<double>::quiet_NaN();
-constexpr double ENDLESS = std::numeric_limits<double>::infinity();
-constexpr double DEGREES = 180.0 / M_PI;
-constexpr int CORNERS = 4;
-constexpr int ROWS = 2 * CORNERS;  // of a pose's errors
-constexpr int DOF = 15;            // camera on flange, view in base, direction and distance of the plane
-constexpr int LEAST_POSES = 6;
+constexpr double NONE = std::numeric_limits<double>::quiet_NaN();    // a number that is not known
+constexpr double ENDLESS = std::numeric_limits<double>::infinity();  // larger than all errors
+constexpr double DEGREES = 180.0 / M_PI;                             // in a radian
+constexpr int CORNERS = 4;                                           // of the view's region
+constexpr int ROWS = 2 * CORNERS;  // number of errors at a pose: u and v of each corner
+constexpr int DOF = 15;  // unknowns: camera on flange (6), view in base (6), direction (2) and distance of the plane
+constexpr int LEAST_POSES = 6;  // fewer determine nothing
 
 using Indices = std::vector<std::size_t>;
 
-/** What is unknown. */
+/** The unknowns of a calibration. */
 struct State
 {
-  Eigen::Isometry3d camera_in_flange;
-  Eigen::Isometry3d view_in_base;
-  Eigen::Vector3d normal;
-  double distance;
+  Eigen::Isometry3d camera_in_flange;  ///< pose of the camera in the flange [m]
+  Eigen::Isometry3d view_in_base;      ///< pose of the camera that stored the view, in the arm's base [m]
+  Eigen::Vector3d normal;              ///< unit normal of the plane in that camera's frame
+  double distance;                     ///< of the plane from that camera [m], > 0
 };
 
 /**
@@ -43,12 +43,12 @@ struct State
  */
 State moved(const State& state, const Eigen::VectorXd& step);
 
-/** A pose, prepared. */
+/** What is known of one HandEyePose, in the form that errors need. */
 struct Observation
 {
-  Eigen::Isometry3d base_in_flange;
-  Eigen::Matrix3d calibrated;  ///< R + (t / d) nᵀ
-  Eigen::VectorXd corners;     ///< where the image has the view's corners [px], ROWS x 1
+  Eigen::Isometry3d base_in_flange;  ///< inverse of HandEyePose::flange_in_base [m]
+  Eigen::Matrix3d calibrated;        ///< R + (t / d) nᵀ, see calibratedHomography()
+  Eigen::VectorXd corners;           ///< where the image has the view's corners [px], ROWS x 1
 };
 
 /** Poses, and the errors of a state in them. */
@@ -80,7 +80,7 @@ public:
    */
   std::vector<Eigen::Vector3d> normals() const;
 
-  /** Of the camera at each pose from the view, before a plane with that normal. */
+  /** The camera's motion from the view to each pose, when the plane has that normal. */
   std::vector<EuclideanHomography> motionsBefore(const Eigen::Vector3d& normal) const;
 
   /** Where the view's corners should be, less where they are [px], ROWS x 1. False when a corner is behind the camera. */
@@ -95,10 +95,10 @@ public:
    */
   void linearize(const State& state, std::size_t i, Eigen::MatrixXd& by_state, Eigen::MatrixXd& by_arm) const;
 
-  /** Weight of distanceError(): with a known distance so large that it holds, else none. */
+  /** Weight of distanceError(): so large that a known distance is kept; 0 when none is known. */
   double distanceWeight() const;
 
-  /** Logarithm of the distance over the one that is known. */
+  /** log(distance of the state / known distance). */
   double distanceError(const State& state) const;
 
 private:
@@ -106,10 +106,10 @@ private:
   double known_distance_;
   std::vector<Eigen::Vector3d> rays_;  // of the view's corners, z = 1
   std::vector<Observation> observations_;
-  std::vector<std::vector<EuclideanHomography>> decompositions_;
+  std::vector<std::vector<EuclideanHomography>> decompositions_;  // of each pose's homography
 };
 
-/** The value in the middle of some. */
+/** The median. @param values at least one. */
 double medianOf(std::vector<double> values);
 
 }  // namespace hand_eye

@@ -11,16 +11,16 @@
 
 namespace view_servo::hand_eye
 {
-/** How large errors are, and what that means for a state. */
+/** How large the errors of arm and images are, and how uncertain a state is by them. */
 struct ErrorModel
 {
-  double ratio = 0.0;       ///< of the arm's error [rad] to that of images [px]
-  double variance = 0.0;    ///< of images [px²]
-  Eigen::MatrixXd inverse;  ///< of the normal equations' matrix, DOF x DOF: covariance of the state for a variance of 1
+  double ratio = 0.0;       ///< standard deviation of the arm's rotation over that of a corner's coordinate [rad/px]
+  double variance = 0.0;    ///< variance of a corner's coordinate [px²]
+  Eigen::MatrixXd inverse;  ///< covariance of the state when that variance is 1, DOF x DOF
 };
 
 /**
- * Lowers the squared errors of some poses. @param whitening of all poses, ROWS x ROWS, so that whitened errors have a
+ * Minimises the sum of squared whitened errors of the poses `used`, from `state`. @param whitening of all poses, ROWS x ROWS, so that whitened errors have a
  * covariance of identity times some factor.
  */
 void fit(const Problem& problem, const Indices& used, const std::vector<Eigen::MatrixXd>& whitening, State& state);

@@ -199,27 +199,21 @@ std::optional<Eigen::Matrix3d> homographyFromPoints(const Correspondences& pairs
 Eigen::Matrix3d refineHomography(const Eigen::Matrix3d& initial, const Correspondences& pairs, double huber_width,
                                  int max_iterations)
 {
-  // A pair that maps beyond infinity has no gradient to follow; such pairs are left out.
   const Eigen::Matrix3d initial_inverse = initial.inverse();
-  Correspondences usable;
-  usable.reserve(pairs.size());
-  std::copy_if(pairs.begin(), pairs.end(), std::back_inserter(usable), [&](const Correspondence& pair) {
-    return std::isfinite(symmetricTransferError(initial, initial_inverse, pair));
-  });
-  const auto normalization = commonNormalization(usable);
-  if (usable.size() < 4 || !normalization)
+  auto usable = refinablePairs(
+      pairs, 4, [&](const Correspondence& pair) { return symmetricTransferError(initial, initial_inverse, pair); });
+  if (!usable)
   {
     return initial;
   }
-  std::transform(usable.begin(), usable.end(), usable.begin(), *normalization);
-  const HomographyProblem problem(std::move(usable), huber_width * normalization->current.scale);
-  Eigen::Matrix3d h =
-      (normalization->current.matrix() * initial * normalization->reference.inverseMatrix()).normalized();
+  const auto& [reference, current] = usable->normalization;
+  const HomographyProblem problem(std::move(usable->pairs), huber_width * current.scale);
+  Eigen::Matrix3d h = (current.matrix() * initial * reference.inverseMatrix()).normalized();
   if (!levenbergMarquardt(problem, h, max_iterations))
   {
     return initial;
   }
-  return (normalization->current.inverseMatrix() * h * normalization->reference.matrix()).normalized();
+  return (current.inverseMatrix() * h * reference.matrix()).normalized();
 }
 
 }  // namespace view_servo

@@ -6,8 +6,12 @@
 
 #include <Eigen/Core>
 
+#include <algorithm>
 #include <cmath>
+#include <cstddef>
+#include <iterator>
 #include <optional>
+#include <utility>
 
 namespace view_servo
 {
@@ -17,14 +21,15 @@ using Vector9d = Eigen::Matrix<double, 9, 1>;
 /** A similarity without rotation: p -> scale (p - centre). */
 struct Normalization
 {
-  Eigen::Vector2d centre;
-  double scale;
+  Eigen::Vector2d centre;  ///< in the units of the points
+  double scale;            ///< > 0
 
   Eigen::Vector2d operator()(const Eigen::Vector2d& point) const
   {
     return scale * (point - centre);
   }
 
+  /** The similarity as a matrix of homogeneous points. */
   Eigen::Matrix3d matrix() const
   {
     Eigen::Matrix3d t;
@@ -105,6 +110,34 @@ inline std::optional<PairNormalization> commonNormalization(const Correspondence
     normalization->current.scale = scale;
   }
   return normalization;
+}
+
+/** What a refinement works on: pairs in normalised coordinates, and what maps them back. */
+struct RefinablePairs
+{
+  Correspondences pairs;  ///< those of finite error, each image's points normalised, see commonNormalization()
+  PairNormalization normalization;  ///< that they were normalised by
+};
+
+/**
+ * The pairs that a refinement can use, normalised.
+ * @param least number of pairs that the refinement needs. @param error double(const Correspondence&), not finite for a pair
+ * that has no gradient to follow and is left out. @return empty when too few remain or they cannot be normalised.
+ */
+template <typename Error>
+std::optional<RefinablePairs> refinablePairs(const Correspondences& pairs, std::size_t least, const Error& error)
+{
+  Correspondences usable;
+  usable.reserve(pairs.size());
+  std::copy_if(pairs.begin(), pairs.end(), std::back_inserter(usable),
+               [&](const Correspondence& pair) { return std::isfinite(error(pair)); });
+  const auto normalization = commonNormalization(usable);
+  if (usable.size() < least || !normalization)
+  {
+    return std::nullopt;
+  }
+  std::transform(usable.begin(), usable.end(), usable.begin(), *normalization);
+  return RefinablePairs{ std::move(usable), *normalization };
 }
 
 /**

@@ -28,9 +28,9 @@ using Matrix9x7d = Eigen::Matrix<double, 9, 7>;
 /** Residual of a point transferred into the other image. Its 2x9 Jacobian by H is `derivative` (x) `point`^T. */
 struct TransferResidual
 {
-  Eigen::Vector2d residual;
-  Eigen::Matrix<double, 2, 3> derivative;
-  Eigen::Vector3d point;
+  Eigen::Vector2d residual;                ///< transferred less observed point
+  Eigen::Matrix<double, 2, 3> derivative;  ///< of the residual by H times `point`
+  Eigen::Vector3d point;                   ///< homogeneous point that dH is multiplied by
 
   Eigen::Matrix<double, 2, 9> jacobian() const
   {

@@ -20,7 +20,7 @@ namespace view_servo
 class SegmentProbe
 {
 public:
-  /** @param tolerance of the distance across [px]. @param min_cosine of the angle between segments that agree. */
+  /** @param tolerance largest distance across [px]. @param min_cosine least cosine of the angle between them. */
   SegmentProbe(const Segment& segment, double tolerance, double min_cosine)
     : segment_(segment),
       tolerance_(tolerance),
@@ -53,10 +53,10 @@ private:
   const Segment segment_;
   const double tolerance_;
   const double min_cosine_;
-  const Eigen::Vector2d along_;
-  const double min_along_;  // component of along_ in the direction of a segment that agrees [px]
-  const Eigen::Array2d low_;
-  const Eigen::Array2d high_;
+  const Eigen::Vector2d along_;  // from the segment's start to its end [px]
+  const double min_along_;       // component of along_ in the direction of a segment that agrees [px]
+  const Eigen::Array2d low_;     // least u and v of the segment's bounding box, widened by the tolerance [px]
+  const Eigen::Array2d high_;    // largest u and v of that box [px]
 };
 
 /**

@@ -55,8 +55,8 @@ public:
   }
 
   /**
-   * The nearest, nearest first.
-   * @param tolerance one that is missed is at most (1 + tolerance) times nearer than the last of those found.
+   * Sets `found` to the `wanted` nearest vectors, nearest first; fewer when there are not so many.
+   * @param tolerance 0: exact; else each one found is at most 1 + tolerance times as far as the one that belongs there.
    */
   void findNearest(const float* query, std::size_t wanted, float tolerance, std::vector<Neighbour>& found) const
   {
@@ -80,7 +80,7 @@ public:
     return { index_.data() + nodes_[number].begin, index_.data() + nodes_[number].end };
   }
 
-  /** All nearer than a radius, nearest first. */
+  /** Sets `found` to all vectors nearer than a radius, nearest first. */
   void findWithin(const float* query, float radius, std::vector<Neighbour>& found) const
   {
     found.clear();
@@ -99,8 +99,8 @@ private:
 
   struct Bounds
   {
-    std::array<float, Columns> low;
-    std::array<float, Columns> high;
+    std::array<float, Columns> low;   // least number in each column
+    std::array<float, Columns> high;  // largest number in each column
   };
 
   /** Its left child is the next node. */
@@ -121,7 +121,7 @@ private:
     std::size_t wanted;
     std::vector<Neighbour>& found;
 
-    /** Only what is nearer can be of use [squared distance]. */
+    /** Only what is nearer is collected [squared distance]; infinite while fewer than `wanted` are. */
     float reach() const
     {
       return found.size() < wanted ? std::numeric_limits<float>::infinity() : found.back().squared_distance;
@@ -147,6 +147,7 @@ private:
     float squared_radius;
     std::vector<Neighbour>& found;
 
+    /** Only what is nearer is collected [squared distance]. */
     float reach() const
     {
       return squared_radius;
@@ -233,12 +234,14 @@ private:
     }
   }
 
+  /** Whether the query is nearer to the vectors left of the split than to those right of it, by the column of the split. */
   static bool leftIsNearer(const Node& node, const float* query)
   {
     const float value = query[static_cast<std::size_t>(node.column)];
     return value - node.left_high < node.right_low - value;
   }
 
+  /** Offers the vectors of a leaf that are in reach to the collector. */
   template <typename Collector>
   void takeLeaf(const Node& leaf, const float* query, Collector& collector) const
   {
@@ -261,6 +264,7 @@ private:
     }
   }
 
+  /** @param squared_factor cells count as this many times as far as they are, squared; 1: exact. */
   template <typename Collector>
   void search(const float* query, float squared_factor, Collector& collector) const
   {
@@ -279,6 +283,10 @@ private:
     descend(0, query, squared_factor, squared_distance, offsets, collector);
   }
 
+  /**
+   * Searches below a node, the nearer child first.
+   * @param squared_distance of the query from the node's cell. @param offsets its parts by column; the same after the call.
+   */
   template <typename Collector>
   void descend(std::size_t number, const float* query, float squared_factor, float squared_distance,
                std::array<float, Columns>& offsets, Collector& collector) const
@@ -308,7 +316,7 @@ private:
   std::vector<std::uint32_t> index_;                            // of the vectors, in the order of the leaves
   std::vector<Group, Eigen::aligned_allocator<Group>> groups_;  // the vectors in the same order
   std::vector<Node> nodes_;
-  Bounds bounds_{};
+  Bounds bounds_{};  // of all vectors
 };
 
 }  // namespace view_servo

@@ -10,7 +10,7 @@
 
 namespace view_servo
 {
-/** Draws what was left to go in the last minute: each curve by its own largest value, which is in brackets. */
+/** Draws the errors of the last minute as curves, each scaled by its own largest value, which stands in brackets. */
 class CurvesWidget : public QWidget
 {
 public:

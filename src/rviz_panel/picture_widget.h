@@ -18,13 +18,13 @@ class PictureWidget : public QWidget
 public:
   explicit PictureWidget(QWidget* parent = nullptr);
 
-  /** @param picture 8-bit BGR; empty: none. @param pickable whether regions are of it. */
+  /** @param picture 8-bit BGR; empty: none. @param pickable whether a region can be dragged on it. */
   void setPicture(const cv::Mat& picture, bool pickable);
 
-  /** Shown in place of a picture. */
+  /** Sets the text that is shown where there is no picture. */
   void setText(const QString& text);
 
-  /** [px of the picture]; empty: everywhere. It stays while a picture that is not pickable is shown. */
+  /** The region that was dragged [px of the picture]; empty: everywhere. It is kept while other pictures are shown. */
   cv::Rect region() const
   {
     return picker_.region();
@@ -40,7 +40,9 @@ protected:
   void mouseReleaseEvent(QMouseEvent* event) override;
 
 private:
+  /** Where the picture is in the widget [px of the widget]. */
   QRectF place() const;
+  /** A position in the widget as RegionPicker takes it. */
   cv::Point toPicker(const QPoint& position) const;
 
   QImage image_;

@@ -49,9 +49,9 @@ private:
   template <typename Body>
   TaskWorker::Task task(Body body) const;
   std::shared_ptr<Core> core_;
-  TaskWorker views_;                 // view_store and the master
-  std::array<TaskWorker, 2> gates_;  // one a driver, so that one that hangs does not hold up the other
-  std::chrono::steady_clock::time_point next_look_;
+  TaskWorker views_;                                 // view_store and the master
+  std::array<TaskWorker, 2> gates_;                  // one a driver, so that one that hangs does not hold up the other
+  std::chrono::steady_clock::time_point next_look_;  // when the views are listed again
 };
 
 }  // namespace view_servo

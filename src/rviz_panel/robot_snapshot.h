@@ -41,7 +41,7 @@ struct TopicPicture
   cv::Mat picture;                              ///< 8-bit BGR; empty while none has come
   std::string fault;                            ///< why the last one cannot be shown; or empty
   std::chrono::steady_clock::time_point since;  ///< when it came, or since when it is waited for
-  unsigned count = 0;                           ///< of pictures so far
+  unsigned count = 0;                           ///< number of pictures so far
 };
 
 /** What is known of a driver. */
@@ -50,27 +50,27 @@ struct DriverState
   std::string kind;                   ///< "homing" or "servo_25d"
   bool is_there = false;              ///< whether its action is served
   std::optional<ServoStatus> status;  ///< the last one
-  std::optional<bool> enabled;        ///< its gate; none: not known
-  bool dry_run = false;
-  int level = 0;         ///< of its diagnostics, as diagnostic_msgs/DiagnosticStatus
-  double silence = 0.0;  ///< since its last diagnostics [s]; 0 before the first
+  std::optional<bool> enabled;        ///< whether its gate is open; empty: not known
+  bool dry_run = false;               ///< whether it runs dry
+  int level = 0;                      ///< level of its diagnostics, a constant of diagnostic_msgs/DiagnosticStatus
+  double silence = 0.0;               ///< time since its last diagnostics [s]; 0 before the first
 };
 
-/** What was left to go; NaN: not known. */
+/** What was left to go at a time, see ServoStatus; NaN: not known. */
 struct ErrorSample
 {
   std::chrono::steady_clock::time_point time;
-  double translation = 0.0;  ///< [m]
-  double rotation = 0.0;     ///< [rad]
-  double points = 0.0;       ///< [px]
+  double translation = 0.0;  ///< translation_error [m]
+  double rotation = 0.0;     ///< rotation_error [rad]
+  double points = 0.0;       ///< point_error [px]
 };
 
-/** What came of the last thing that was asked for. */
+/** What came of the last thing that was asked for, for people. */
 struct Words
 {
-  std::string text;
-  bool is_good = true;
-  unsigned count = 0;  ///< of texts so far
+  std::string text;     ///< one line; empty: nothing was asked for
+  bool is_good = true;  ///< false: it failed
+  unsigned count = 0;   ///< number of texts so far
 };
 
 /** All that a RobotLink knows. Pictures share their data, which nobody changes. */
@@ -79,9 +79,9 @@ struct RobotSnapshot
   std::array<DriverState, 2> drivers;  ///< homing, servo_25d
   std::deque<ErrorSample> errors;      ///< of the last minute, oldest first
   std::vector<ListedView> views;
-  std::string views_fault;   ///< why they cannot be listed; or empty
-  unsigned views_count = 0;  ///< of changes of `views` so far
-  std::vector<std::string> image_topics;
+  std::string views_fault;                ///< why they cannot be listed; or empty
+  unsigned views_count = 0;               ///< how often `views` has changed so far
+  std::vector<std::string> image_topics;  ///< topics of images that the master knows
   TopicPicture camera;
   TopicPicture overlay;
   Words words;

@@ -18,11 +18,11 @@ struct CallOutcome
 {
   enum Kind
   {
-    ANSWERED,
-    NO_SERVICE,
-    LATE,     ///< it did not answer in time
-    FAILED,   ///< it reported a failure, or its node has gone
-    GIVEN_UP  ///< something else had to be done at once
+    ANSWERED,    ///< the response is there
+    NO_SERVICE,  ///< nobody offers it
+    LATE,        ///< it did not answer in time
+    FAILED,      ///< it reported a failure, or its node has gone
+    GIVEN_UP     ///< something else had to be done at once
   };
   Kind kind;
   std::string text;  ///< what is wrong, in words; empty when it has answered
@@ -57,7 +57,9 @@ public:
   }
 
 private:
+  /** Lets expire() end the call; false when it must not begin, as room has to be made. */
   bool begin(const ros::ServiceClient& client, double patience);
+  /** Says how a call ended. */
   CallOutcome end(const std::string& name, bool answered, double patience);
 
   TaskQueue& queue_;
@@ -80,10 +82,11 @@ public:
   TaskWorker(const TaskWorker&) = delete;
   TaskWorker& operator=(const TaskWorker&) = delete;
 
+  /** Runs a task after those that wait. */
   void add(Task task);
   /** Drops what waits, gives up the calls of what runs, and runs the task next. */
   void replace(Task task);
-  /** The same; it is the last one. */
+  /** As replace(); later tasks are not run any more. */
   void finish(Task task);
   /** Ends calls that are late or given up. To be called often. */
   void expire();
@@ -91,7 +94,7 @@ public:
   bool isIdle() const;
 
 private:
-  std::shared_ptr<TaskQueue> queue_;  // also of a thread that is left behind
+  std::shared_ptr<TaskQueue> queue_;  // shared with the thread, which may outlive this object
   std::thread thread_;
 };
 

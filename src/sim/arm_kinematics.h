@@ -17,7 +17,7 @@ struct ArmKinematicsParams
 {
   std::string base_link = "base_link";
   std::string camera_frame = "camera_optical_frame";  ///< x right, y down, z forward (REP 103)
-  double damping = 0.05;                              ///< of the inverse at a singularity
+  double damping = 0.05;                              ///< damping of the least squares at a singularity, > 0
   double min_manipulability = 0.02;                   ///< smallest singular value of the Jacobian that needs no damping
 
   /** Each fault in one line, those of nested parameters included; empty when the parameters are usable. */
@@ -57,7 +57,7 @@ public:
   ArmKinematics(const std::string& urdf_xml, const ArmKinematicsParams& params);
   ~ArmKinematics();
 
-  /** From the base to the camera. */
+  /** Names of the joints in the order from the base to the camera. */
   const std::vector<std::string>& jointNames() const
   {
     return names_;
@@ -76,6 +76,7 @@ public:
   /** base_link from the optical frame. */
   Eigen::Isometry3d pose(const Joints& joints) const;
 
+  /** The Jacobian at joint angles [rad]: joint velocities -> twist of the camera. */
   Jacobian jacobian(const Joints& joints) const;
 
   /**

@@ -24,12 +24,12 @@ struct NomadParams
   double max_acceleration = 1.0;       ///< [m/s²]
   double max_turn_acceleration = 2.0;  ///< [rad/s²]
   double radius = 0.26;                ///< of its round outline on the floor [m]
-  double odometry_drift = 0.0;         ///< by which part it measures distances too long
-  double odometry_turn_scale = 1.0;    ///< by which factor it measures turns too large, as where wheels skid
+  double odometry_drift = 0.0;         ///< part by which odometry measures distances too long
+  double odometry_turn_scale = 1.0;    ///< measured turn over true turn; above 1 where wheels skid
   double deadband_speed = 0.0;         ///< slower commands do not move it [m/s]
   double deadband_turn_rate = 0.0;     ///< slower commands do not turn it [rad/s]
-  double odometry_turn_drift = 0.0;    ///< turn that it measures and that does not happen [rad/m]
-  double odometry_noise = 0.0;         ///< standard deviation of measured motion, as a part of it
+  double odometry_turn_drift = 0.0;    ///< turn that odometry adds, by the way driven [rad/m]
+  double odometry_noise = 0.0;         ///< standard deviation of the measured motion, as a part of it
   std::uint64_t seed = 1;              ///< of odometry's noise
 
   /** Each fault in one line, those of nested parameters included; empty when the parameters are usable. */
@@ -78,7 +78,7 @@ public:
   Eigen::Isometry3d pose() const;
   /** World from the camera's optical frame. */
   Eigen::Isometry3d cameraPose() const;
-  /** The true one. */
+  /** The true velocity. */
   const Velocity& velocity() const
   {
     return velocity_;

@@ -62,7 +62,7 @@ public:
    */
   Puma(const std::string& urdf_xml, const PumaParams& params);
 
-  /** In the order from the base to the camera. */
+  /** Names of the joints in the order from the base to the camera. */
   const std::vector<std::string>& jointNames() const;
 
   /**
@@ -91,8 +91,9 @@ public:
    */
   void step(double dt);
 
-  /** True joint angles [rad] and velocities [rad/s]. */
+  /** True joint angles [rad]. */
   const Joints& joints() const;
+  /** True joint velocities [rad/s]. */
   const Joints& velocities() const;
   /** A reading of the encoders [rad], whose noise is new at every call. */
   Joints measuredJoints();
@@ -101,7 +102,7 @@ public:
   /** base_link from the optical frame where the URDF has it, for any joint angles. */
   Eigen::Isometry3d nominalCameraPose(const Joints& joints) const;
 
-  /** After the last step. */
+  /** The state after the last step. */
   State state() const;
   /** The reason for the state, for instance which joint is at its end; may be empty. */
   const std::string& message() const;

@@ -62,8 +62,8 @@ private:
   cv::RNG noise_;
   Eigen::Matrix3d pinhole_;  ///< K of what OpenGL draws, larger than the image where the lens distorts
   cv::Size pinhole_size_;
-  cv::Mat map_u_;  ///< where in that each pixel looks; empty without distortion
-  cv::Mat map_v_;
+  cv::Mat map_u_;  ///< u, in what OpenGL draws, of each pixel of the image [px]; empty without distortion
+  cv::Mat map_v_;  ///< v likewise
   std::unique_ptr<Context> context_;
 };
 

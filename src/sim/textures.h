@@ -17,7 +17,7 @@ std::string textureKinds();
  * @param kind `checker` (count x count fields), `blotches`, `wood`, `bricks`, `panel` (a cupboard's door), `poster`
  * (patches of all sizes), `print` (the front of a box: lettering and shapes) or `plain`.
  * @param size of the picture [px].
- * @param grey about the mean of the picture [0, 255].
+ * @param grey mean grey level of the picture, roughly, in [0, 255].
  * @param count how many things are drawn, for kinds that have a number of them.
  * @throws std::invalid_argument for an unknown kind or an empty size.
  */

@@ -29,17 +29,17 @@ struct Surface
   std::string name;
   std::string group;        ///< is drawn only when this group is asked for; empty: always
   Eigen::Isometry3d pose;   ///< world from surface
-  Eigen::Vector2d size;     ///< along its x and y
-  int texture;              ///< index in World::textures
-  Eigen::Vector2d repeat;   ///< how often the picture fits along x and y
-  double brightness = 1.0;  ///< factor of the picture's grey levels
+  Eigen::Vector2d size;     ///< lengths along its x and y [m]
+  int texture;              ///< index into World::textures
+  Eigen::Vector2d repeat;   ///< how often the picture is repeated along x and y
+  double brightness = 1.0;  ///< factor by which the picture's grey levels are multiplied
 };
 
 /** A thing on the floor where the base cannot be: its outline is a convex polygon, counter-clockwise, in the world. */
 struct Obstacle
 {
   std::string name;
-  std::vector<Eigen::Vector2d> outline;
+  std::vector<Eigen::Vector2d> outline;  ///< corners [m]
 };
 
 /** How good the images of a camera are. */
@@ -68,7 +68,7 @@ enum class RobotKind
 struct Waypoint
 {
   double time;             ///< [s]
-  Eigen::Isometry3d pose;  ///< as World has them
+  Eigen::Isometry3d pose;  ///< of the frame whose poses a World holds
 };
 
 /**
@@ -85,14 +85,14 @@ struct World
   double camera_rate = 10.0;                                         ///< of images [Hz]
   ImageQuality quality;
   Light light;
-  double background = 128.0;      ///< where no surface is seen [grey levels]
+  double background = 128.0;      ///< radiance where no surface is seen [grey levels]
   std::vector<cv::Mat> textures;  ///< 8-bit with one channel
   std::vector<Surface> surfaces;
   std::vector<Obstacle> obstacles;
-  Eigen::Isometry3d goal = Eigen::Isometry3d::Identity();  ///< where the view is stored
-  cv::Rect region;  ///< of interest, in the view at the goal [px]; empty: all of it
-  std::map<std::string, Eigen::Isometry3d> starts;
-  std::map<std::string, std::vector<Waypoint>> trajectories;
+  Eigen::Isometry3d goal = Eigen::Isometry3d::Identity();  ///< pose at which the view is stored
+  cv::Rect region;                                  ///< of interest, in the view at the goal [px]; empty: all of it
+  std::map<std::string, Eigen::Isometry3d> starts;  ///< poses to begin at, by name
+  std::map<std::string, std::vector<Waypoint>> trajectories;  ///< by name, each by ascending time
 
   /** @throws std::invalid_argument that lists the names of all starts, when there is none of this name. */
   const Eigen::Isometry3d& start(const std::string& start_name) const;
@@ -100,7 +100,7 @@ struct World
   const std::vector<Waypoint>& trajectory(const std::string& trajectory_name) const;
 };
 
-/** The world with another noise of images [grey levels]; a negative one leaves it as it is. */
+/** The world with another standard deviation of its images' noise [grey levels]; a negative one leaves it as it is. */
 World withImageNoise(World world, double noise);
 
 /** A calibration whose focal lengths are too long by this part of them: 0.01 is one per cent. */

@@ -16,7 +16,10 @@ namespace view_servo
 {
 /** @file What the programs that run a simulated base once share. */
 
-/** "x y yaw" [m, m, rad] in the world, or the name of one of its starts; yaw may be left out. */
+/**
+ * The start that a text means: "x y yaw" [m, m, rad] in the world, where yaw may be left out, or the name of one of the
+ * world's starts. @throws std::invalid_argument when it is neither.
+ */
 inline Eigen::Isometry3d parseStart(const sim::World& world, const std::string& text)
 {
   std::istringstream stream(text);
@@ -34,7 +37,7 @@ inline Eigen::Isometry3d parseStart(const sim::World& world, const std::string& 
   return sim::planarPose(x, y, yaw);
 }
 
-/** The pose on the floor of a camera: x along its axis. */
+/** The pose on the floor of a camera, whose x axis is the camera's optical axis seen from above. @param camera world from camera. */
 inline PlanarPose onFloor(const Eigen::Isometry3d& camera)
 {
   const Eigen::Vector3d axis = camera.linear().col(2);

@@ -36,10 +36,12 @@ public:
   /** @param prefix put before names, with a slash between, as robot_state_publisher does; empty: names stay as they are. */
   explicit FrameNames(const std::string& prefix);
 
+  /** The name of a frame with the prefix before it. */
   std::string operator()(const std::string& frame) const
   {
     return prefix_ + frame;
   }
+  /** The message with the prefix before its frame_id and child_frame_id. */
   geometry_msgs::TransformStamped operator()(geometry_msgs::TransformStamped transform) const;
   nav_msgs::Odometry operator()(nav_msgs::Odometry odometry) const;
 
@@ -47,6 +49,7 @@ private:
   std::string prefix_;  // empty, or with a slash at its end
 };
 
+/** A pose [m] as a message. */
 geometry_msgs::Pose toPose(const Eigen::Isometry3d& pose);
 /** @throws std::invalid_argument when the pose is not finite or its quaternion is not of length 1 (within 1 %). */
 Eigen::Isometry3d toIsometry(const geometry_msgs::Pose& pose);
@@ -55,7 +58,7 @@ Eigen::Isometry3d toIsometry(const geometry_msgs::Pose& pose);
 geometry_msgs::TransformStamped toTransform(const Eigen::Isometry3d& pose, const std::string& parent,
                                             const std::string& child, const ros::Time& stamp);
 
-/** @param camera world from the true camera's optical frame. */
+/** The true pose of the camera in `world`. @param camera world from the true camera's optical frame [m]. */
 geometry_msgs::PoseStamped toGroundTruth(const Eigen::Isometry3d& camera, const ros::Time& stamp);
 
 /** The odometry of the base: its pose in `odom`, its velocity in `base_link`. */
@@ -66,7 +69,7 @@ sensor_msgs::JointState toJointState(const Puma& puma, const Puma::Joints& measu
 
 /**
  * The calibration that a robot believes its camera to have.
- * @param focal_length_error by which part its focal lengths are too long.
+ * @param focal_length_error part by which its focal lengths are too long: 0.01 is one per cent.
  */
 sensor_msgs::CameraInfo toCameraInfo(const World& world, double focal_length_error, const ros::Time& stamp);
 

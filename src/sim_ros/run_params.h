@@ -14,7 +14,7 @@ namespace view_servo
 /** The parameters of a run; the defaults are those of the arm. */
 struct RunParams
 {
-  std::string world = "rice";
+  std::string world = "rice";        ///< a world's file, or the name of one in config/worlds/
   std::string start = "near";        ///< where the robot begins, as the program describes it
   std::string view = "demo";         ///< the name that the view is stored by
   bool arm = true;                   ///< false: of a base, which has no approach

@@ -225,6 +225,7 @@ private:
     }
   }
 
+  /** Takes the camera's true pose. */
   void takeTruth(const geometry_msgs::PoseStamped::ConstPtr& message)
   {
     const std::lock_guard<std::mutex> lock(mutex_);
@@ -239,6 +240,7 @@ private:
     status_ = message->reason;
   }
 
+  /** Number of true poses that have come. */
   int truths() const
   {
     const std::lock_guard<std::mutex> lock(mutex_);
@@ -282,6 +284,10 @@ private:
     return "";
   }
 
+  /**
+   * Waits until a condition holds for the last two true poses of the camera, both of which came after the call, and returns
+   * the last one. @param what to say when it does not hold in time.
+   */
   Eigen::Isometry3d waitFor(const std::string& what,
                             const std::function<bool(const Eigen::Isometry3d&, const Eigen::Isometry3d&)>& holds)
   {
@@ -297,14 +303,14 @@ private:
 
   ros::NodeHandle& nh_;
   const RunParams& params_;
-  const std::string robot_;
-  const std::string controller_;
+  const std::string robot_;       // node of the simulation
+  const std::string controller_;  // node that drives it
   const std::string action_name_;
-  mutable std::mutex mutex_;  // guards what follows, up to the client
-  Eigen::Isometry3d previous_ = Eigen::Isometry3d::Identity();
-  Eigen::Isometry3d truth_ = Eigen::Isometry3d::Identity();
-  int truths_ = 0;
-  std::string status_;
+  mutable std::mutex mutex_;                                    // guards what follows, up to the client
+  Eigen::Isometry3d previous_ = Eigen::Isometry3d::Identity();  // the true pose before truth_
+  Eigen::Isometry3d truth_ = Eigen::Isometry3d::Identity();     // the newest true pose: world from camera
+  int truths_ = 0;                                              // number of true poses that have come
+  std::string status_;                                          // reason of the driver's last status
   actionlib::SimpleActionClient<Action> client_;
   ros::Subscriber truth_subscriber_;
   ros::Subscriber status_subscriber_;

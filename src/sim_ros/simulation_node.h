@@ -120,6 +120,7 @@ private:
   /** How long a command holds [s]. With a cycle of control and the time to brake the robot stands within 0.25 s. */
   static constexpr double COMMAND_TIMEOUT = 0.2;
 
+  /** Time from `then` to now [s]. */
   static double since(Clock::time_point then)
   {
     return std::chrono::duration<double>(Clock::now() - then).count();

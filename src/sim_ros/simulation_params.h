@@ -15,7 +15,7 @@
 
 namespace view_servo::sim
 {
-/** The parameters that the nodes of all simulated robots have. */
+/** The parameters that the nodes of all simulated robots have; parameters(SimulationParams&) says what each means. */
 struct SimulationParams
 {
   std::string world = "desk";

@@ -16,11 +16,11 @@ struct CheckOptions
 {
   check::Setup setup;
   check::DriveParams drive;
-  double seconds = 10.0;  ///< of listening
-  bool move = false;
-  bool yes = false;  ///< drives without a question
-  bool json = false;
-  bool no_picture = false;
+  double seconds = 10.0;                    ///< how long to listen [s]
+  bool move = false;                        ///< move the robot a little afterwards
+  bool yes = false;                         ///< drive without asking
+  bool json = false;                        ///< print one JSON object instead of lines
+  bool no_picture = false;                  ///< write no picture
   std::string picture = "check_robot.png";  ///< file to write the camera's picture to, unless `no_picture`
   std::vector<std::string> for_ros;         ///< arguments for ros::init()
 };

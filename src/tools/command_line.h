@@ -67,16 +67,18 @@ public:
   /** @param introduction what the program does and how it is called. @param ending for the end of --help. */
   CommandLine(std::string introduction, std::string ending);
 
+  /** An option without a value; `value` becomes true when it is given. */
   void flag(const std::string& name, bool& value, const std::string& description);
+  /** An option whose value is any text. Without it `value` stays as it is, here and below. */
   void text(const std::string& name, std::string& value, const std::string& description);
-  /** One of some words. */
+  /** An option whose value is one of `words`. */
   void choice(const std::string& name, std::string& value, const std::vector<std::string>& words,
               const std::string& description);
-  /** May be given more than once. @param separator of several in one word; 0: none. */
+  /** An option that may be given more than once. @param separator between several values in one word; 0: none. */
   void list(const std::string& name, std::vector<std::string>& values, const std::string& description,
             char separator = '\0');
 
-  /** @tparam Number double, int, std::uint64_t, or std::optional of one, which has no default. */
+  /** An option whose value is a number within `range`. @tparam Number double, int, std::uint64_t, or std::optional of one, which has no default. */
   template <typename Number>
   void number(const std::string& name, Number& value, const NumberRange& range, const std::string& description);
 

@@ -63,15 +63,17 @@ public:
   {
     return collector_.atKnownPose();
   }
+  /** The stored view that is followed. */
   const HandEyeView& view() const
   {
     return collector_.view();
   }
+  /** The poses taken so far, oldest first. */
   const std::vector<HandEyePose>& poses() const
   {
     return collector_.poses();
   }
-  /** The frame of the images; empty until there is one. */
+  /** frame_id of the camera's images; empty until it is known. */
   const std::string& cameraFrame() const
   {
     return camera_frame_;
@@ -82,9 +84,10 @@ private:
   struct Received
   {
     Homography::ConstPtr message;
-    Clock::time_point time;
+    Clock::time_point time;  // when it came
   };
 
+  /** Takes one homography; whether a pose was added. */
   bool take(const Homography& message);
 
   HandEyeSources sources_;

@@ -17,7 +17,7 @@ struct RegionJudgement
 };
 
 /**
- * By the measures of check_robot: corners, segments, light, sharpness.
+ * Judges a region by the measures of check_robot: corners, segments, light, sharpness.
  * @param picture 8-bit, grey or BGR. @param region [px]; what is beyond the picture does not count; empty: all of it.
  */
 RegionJudgement judgeRegion(const cv::Mat& picture, const cv::Rect& region);

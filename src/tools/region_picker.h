@@ -15,17 +15,17 @@ namespace view_servo
 class RegionPicker
 {
 public:
-  /** Larger images are shown smaller [px]. */
+  /** Images larger than this are shown smaller [px]. */
   static constexpr int MAX_WIDTH = 1280;
   static constexpr int MAX_HEIGHT = 800;
 
-  /** A region with a shorter side is taken for a click, which takes the region back [px of the image]. */
+  /** A drag over a region with a shorter side counts as a click, which removes the region [px of the image]. */
   static constexpr int MIN_SIDE = 16;
 
   /** Says how large the image is [px]. When that changes, the region is gone. */
   void setImageSize(const cv::Size& size);
 
-  /** Of the image as it is shown, at most 1. */
+  /** Size of the image as it is shown over its true size, (0, 1]. */
   double scale() const;
 
   /** The mouse's button, at a pixel of the window. Places beside the image are moved to its border. */
@@ -36,6 +36,7 @@ public:
   /** The region, also while it is dragged [px of the image], within the image; empty: none, everywhere. */
   cv::Rect region() const;
 
+  /** Whether the button is down. */
   bool isDragged() const
   {
     return dragged_;

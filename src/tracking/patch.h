@@ -42,10 +42,10 @@ struct Patch
 {
   bool usable = false;          ///< false: too near the border, of too little contrast, or an edge; the rest is not set
   int radius = 0;               ///< [px]
-  Eigen::Matrix2d information;  ///< of its position [1/px²]
+  Eigen::Matrix2d information;  ///< inverse covariance of its position [1/px²]
   std::vector<float> values;    ///< zero mean, unit norm
   std::vector<float> descent_u;  ///< components of the inverse Hessian times the gradient of `values`
-  std::vector<float> descent_v;
+  std::vector<float> descent_v;  ///< likewise for v
 };
 
 /** The patch about a place of an 8-bit grey image. */
@@ -56,7 +56,7 @@ struct PatchAlignment
 {
   Eigen::Vector2d shift = Eigen::Vector2d::Zero();  ///< what h shows at `at` is the stored view at `at + shift` [px]
   Eigen::Vector2d found;                            ///< where the patch's middle is in the current image [px]
-  double correlation;                               ///< with what h showed there before the last step, in [-1, 1]
+  double correlation;  ///< of the patch with what was seen in its place before the last step, in [-1, 1]
 };
 
 /**

@@ -25,7 +25,7 @@ class RegionRefiner
 public:
   /**
    * @param reference 8-bit, one channel. @param region inside it that shows the plane [px].
-   * @param min_correlation of a block with what is seen in its place, for it to count, in [0, 1).
+   * @param min_correlation least correlation of a block with what is seen in its place for the block to count, in [0, 1).
    */
   RegionRefiner(const cv::Mat& reference, const cv::Rect& region, double min_correlation);
 
@@ -43,8 +43,8 @@ public:
   Eigen::Matrix3d refine(const cv::Mat& current, const Eigen::Matrix3d& h) const;
 
 private:
-  static constexpr int RADIUS = 10;  // of a block [px]
-  static constexpr int SIDE = 2 * RADIUS + 1;
+  static constexpr int RADIUS = 10;            // of a block [px]
+  static constexpr int SIDE = 2 * RADIUS + 1;  // of a block [px]
 
   /** A square of the stored view, small enough to be all of one light, with what its alignment needs. */
   struct Block
@@ -65,12 +65,18 @@ private:
     Vector8 right;     // its part in the right side of the normal equations
   };
 
+  /** The block whose upper left pixel is `corner`; empty when it has hardly any contrast. */
   std::optional<Block> makeBlock(const cv::Mat& image, const cv::Point& corner) const;
+  /** What a block adds to the matrix of the normal equations. */
   Matrix8 informationOf(const Block& block) const;
 
+  /** The blocks that the current image shows where h sends them, and that correlate enough with it. */
   std::vector<SeenBlock> seenBlocks(const cv::Mat& current, const Eigen::Matrix3d& h) const;
+  /** Compares a block with the grey values seen in its place; empty when they correlate too little. */
   std::optional<SeenBlock> compare(const Block& block, const std::vector<float>& values) const;
+  /** The change of the homography that fits the blocks best; empty when they do not determine it. */
   std::optional<Eigen::Matrix3d> solve(const std::vector<SeenBlock>& seen) const;
+  /** By how much a change moves the corner of the region that it moves most [px]. */
   double largestShift(const Eigen::Matrix3d& change) const;
 
   float min_correlation_;

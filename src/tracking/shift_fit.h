@@ -21,8 +21,8 @@ using Vector8 = Eigen::Matrix<double, 8, 1>;
 /** Coordinates about the middle of some points and of the order of 1: x = (pixel - middle) / spread. */
 struct Centring
 {
-  Eigen::Vector2d middle = Eigen::Vector2d::Zero();  ///< [px]
-  double spread = 1.0;                               ///< [px]
+  Eigen::Vector2d middle = Eigen::Vector2d::Zero();  ///< mean of the points [px]
+  double spread = 1.0;                               ///< their distance from it, roughly: the unit of x [px], > 0
 
   Eigen::Vector2d apply(const Eigen::Vector2d& pixel) const
   {
@@ -51,12 +51,12 @@ public:
   /** The point at `at` moves to `at + shift` [px]. @param information inverse covariance of the shift [1/px²]. */
   void add(const Eigen::Vector2d& at, const Eigen::Vector2d& shift, const Eigen::Matrix2d& information);
 
-  /** Empty when the shifts do not determine it. */
+  /** The fit to all shifts added; empty when they do not determine it. */
   std::optional<Eigen::Matrix3d> solve() const;
 
   /**
-   * Where the shifts are that a fit explains to within a residual [px].
-   * @param rms of the residuals of these [px], 0 when there are none.
+   * The points `at` whose shifts a fit explains to within `max_residual` [px].
+   * @param rms is set to the root mean square of their residuals [px], 0 when there are none.
    */
   Points supporting(const Eigen::Matrix3d& fitted, double max_residual, double& rms) const;
 

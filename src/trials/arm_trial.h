@@ -27,24 +27,25 @@ struct ArmConditions
   Light light;                              ///< while the arm servos; the view is stored under the world's light
   std::vector<std::string> groups;          ///< of surfaces that were not there when the view was stored
   double encoder_noise = 0.0;               ///< standard deviation of each reading [rad]
-  double hand_eye_translation_error = 0.0;  ///< of the camera's place on the hand [m]
-  double hand_eye_rotation_error = 0.0;     ///< of its direction [rad]
+  double hand_eye_translation_error = 0.0;  ///< how far the camera's true place on the hand is from the URDF's [m]
+  double hand_eye_rotation_error = 0.0;     ///< angle between its true orientation and the URDF's [rad]
   /**
    * Where a calibration has the camera, in the optical frame of the arm's description. Tracking and servoing take it for the
    * camera's frame; empty: they take the description's.
    */
   std::optional<Eigen::Isometry3d> calibrated_camera;
-  double focal_length_error = 0.0;  ///< by which part the calibration has focal lengths too long
+  double focal_length_error = 0.0;  ///< part by which the calibration's focal lengths are too long
   double covered_from = -1.0;       ///< when something covers the camera for 2 s [s]; negative: never
 };
 
+/** Options of ArmTrials. */
 struct ArmTrialParams
 {
   PlaneTrackerParams tracker;
   Servo25dParams servo;
   VelocityLimits limits = ARM_LIMITS;
   ArmConditions conditions;
-  double control_period = 0.02;  ///< [s]
+  double control_period = 0.02;  ///< time from one command to the next [s]
   double image_delay = 0.05;     ///< from an image's stamp until servoing gets what tracking makes of it [s]
   double matching_time = 0.3;  ///< from an image's stamp until tracking gets where the view is in it by its points [s]
   double max_duration = 40.0;  ///< after which a run is given up [s]
@@ -62,6 +63,7 @@ struct ArmStep
   Twist sent;                ///< last command, in the camera's frame [m/s, rad/s]
 };
 
+/** How a run ended. */
 struct ArmOutcome
 {
   bool converged = false;          ///< what servoing says, if no joint came to its end

@@ -10,10 +10,11 @@ namespace view_servo::sim
 /** What a matcher finds in an image. */
 struct StampedEvidence
 {
-  double stamp;  ///< of the image [s]
-  HeadingEvidence pixels;
+  double stamp;            ///< of the image [s]
+  HeadingEvidence pixels;  ///< matches in pixels of the raw images
 };
 
+/** All candidates of a match, weighted by their scores. */
 inline StampedEvidence toEvidence(double stamp, const ViewMatch& match)
 {
   StampedEvidence result{ stamp, {} };

@@ -21,24 +21,25 @@ namespace view_servo::sim
 struct HomingConditions
 {
   double image_noise = -1.0;         ///< standard deviation [grey levels]; negative: the world's
-  double odometry_drift = 0.0;       ///< by which part distances are measured too long
+  double odometry_drift = 0.0;       ///< part by which distances are measured too long
   double light_gain = 1.0;           ///< factor of the light under which the view was stored
-  double focal_length_error = 0.0;   ///< by which part the calibration has focal lengths too long
+  double focal_length_error = 0.0;   ///< part by which the calibration's focal lengths are too long
   double occluded_from = -1.0;       ///< when a person begins to walk by, which takes 2 s [s]; negative: never
-  double odometry_turn_scale = 1.0;  ///< turn that odometry measures by the true one
+  double odometry_turn_scale = 1.0;  ///< measured turn over true turn
   double deadband_speed = 0.0;       ///< slower commands do not move the base [m/s]
   double deadband_turn_rate = 0.0;   ///< slower commands do not turn it [rad/s]
-  double odometry_delay = 0.0;       ///< by which odometry is stamped later than images of the same moment [s]
+  double odometry_delay = 0.0;       ///< how much later odometry is stamped than images of the same moment [s]
 };
 
+/** Options of HomingTrials. */
 struct HomingTrialParams
 {
   HomingParams homing;
   VelocityLimits limits;
   HomingConditions conditions;
-  ViewStructure structure;  ///< what is known of the view beforehand; without points: nothing
-  bool use_points = true;
-  bool use_lines = true;
+  ViewStructure structure;      ///< what is known of the view beforehand; without points: nothing
+  bool use_points = true;       ///< whether images are matched by points
+  bool use_lines = true;        ///< whether images are matched by lines
   bool line_pairs = false;      ///< groups of lines are pairs instead of triplets
   double points_period = 0.5;   ///< between two images that are matched by points [s], > 0
   double lines_period = 1.0;    ///< between two images that are matched by lines [s], > 0
@@ -51,19 +52,20 @@ struct HomingTrialParams
 struct HomingStep
 {
   double time = 0.0;      ///< since the start [s]
-  PlanarPose base;        ///< the true one, in the world
+  PlanarPose base;        ///< true pose of the base in the world [m, rad]
   HomingReport report;    ///< with what homing makes of the image
-  BaseVelocity velocity;  ///< the true one, in the base's frame [m/s, rad/s]
+  BaseVelocity velocity;  ///< true velocity of the base, in its own frame [m/s, rad/s]
 };
 
+/** How a run ended. */
 struct HomingOutcome
 {
-  bool arrived = false;         ///< what homing says
+  bool arrived = false;         ///< whether homing says that it has arrived
   std::string reason;           ///< why homing ended
   double distance_error = 0.0;  ///< true distance from the goal at the end [m]
-  double ahead_error = 0.0;     ///< its part along the goal's x axis: past (+) or before (-) the goal [m]
-  double side_error = 0.0;      ///< its part across: to the goal's left (+) or right (-) [m]
-  double yaw_error = 0.0;       ///< true one, at the end [rad]
+  double ahead_error = 0.0;     ///< part of the distance along the goal's x axis: past (+) or before (-) the goal [m]
+  double side_error = 0.0;      ///< part of the distance across that axis: to the goal's left (+) or right (-) [m]
+  double yaw_error = 0.0;       ///< true yaw less the goal's, at the end [rad]
   double duration = 0.0;        ///< until homing ended [s]
   double travelled = 0.0;       ///< length of the true path [m]
   int reversals = 0;            ///< how often the base changed between driving ahead and back

@@ -17,13 +17,17 @@
 
 namespace view_servo::sim
 {
+/** Options of runRoute(). */
 struct RouteTrialParams
 {
   HomingParams homing;
   RouteGuideParams guide;
   RouteSpacingParams spacing;
   VelocityLimits limits;
-  /** While the route is recorded and followed; the light only while it is followed. Of them: noise, odometry, light. */
+  /**
+   * What makes it harder, of which only the noise of images, the errors of odometry and the light are used: the light while
+   * the route is followed, the others while it is recorded, too.
+   */
   HomingConditions conditions;
   double matching_period = 0.2;  ///< between two images that are matched by points [s], > 0
   double matching_time = 0.15;   ///< from an image's stamp until homing gets its matches [s]
@@ -31,18 +35,19 @@ struct RouteTrialParams
   std::uint64_t seed = 1;        ///< of the noise of images and odometry
 };
 
+/** How a route was followed. */
 struct RouteOutcome
 {
-  bool arrived = false;
-  std::string reason;           ///< why it ended
-  std::size_t views = 0;        ///< of the route
+  bool arrived = false;         ///< whether homing says that it has arrived at the last view
+  std::string reason;           ///< why the run ended
+  std::size_t views = 0;        ///< number of views of the route
   std::size_t reached = 0;      ///< number of the view that was driven to last, from 1
-  double length = 0.0;          ///< true one, of the recorded way [m]
-  double sideways_rms = 0.0;    ///< true distances from the recorded way, from the first view that was left on [m]
-  double sideways_max = 0.0;    ///< the largest of them [m]
+  double length = 0.0;          ///< true length of the recorded way [m]
+  double sideways_rms = 0.0;    ///< RMS of the base's true distances from the recorded way, once a view was passed [m]
+  double sideways_max = 0.0;    ///< largest of these distances [m]
   double distance_error = 0.0;  ///< true distance from the last view's place at the end [m]
-  double yaw_error = 0.0;       ///< true one, at the end [rad]
-  double duration = 0.0;        ///< [s]
+  double yaw_error = 0.0;       ///< true yaw less that at the last view, at the end [rad]
+  double duration = 0.0;        ///< time of following the route [s]
 };
 
 /**

@@ -21,7 +21,7 @@ public:
   {
   }
 
-  /** Whether it is time for it; each time is asked for at most once, and times increase. */
+  /** Whether it happens at `time` [s]. To be asked once for each time, with increasing times. */
   bool due(double time)
   {
     if (time < next_ - 1e-9)
@@ -33,8 +33,8 @@ public:
   }
 
 private:
-  double period_;
-  double next_ = 0.0;
+  double period_;      // [s]
+  double next_ = 0.0;  // when it happens next [s]
 };
 
 /** Values that are ready some time after they were begun, and are taken in the order in which they were begun. */
@@ -42,13 +42,13 @@ template <typename Value>
 class Delayed
 {
 public:
-  /** @param ready when the value may be taken. */
+  /** Adds a value, begun after all before it. @param ready from which time on it may be taken [s]. */
   void add(double ready, Value value)
   {
     waiting_.emplace_back(ready, std::move(value));
   }
 
-  /** Takes the oldest value, if it is ready. */
+  /** Takes the oldest value out, if it is ready at `time` [s]; else empty. */
   std::optional<Value> take(double time)
   {
     if (waiting_.empty() || time < waiting_.front().first)

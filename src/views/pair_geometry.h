@@ -23,16 +23,16 @@ namespace view_servo
 /** A reference corner and where it is in the current image, in the pixels of their levels. */
 struct CornerMatch
 {
-  int row;  ///< index of the reference corner, which is its row in the association
-  Eigen::Vector2d current;
-  double score;
+  int row;                  ///< index of the reference corner, which is its row in the association
+  Eigen::Vector2d current;  ///< [px of the level]
+  double score;             ///< weight of its association; 0: findAlong() found it without one
 };
 
 /** A geometry with the associations that agree with it. */
 struct PairFit
 {
-  Eigen::Matrix3d matrix;
-  std::vector<Association> inliers;
+  Eigen::Matrix3d matrix;            ///< of the model, reference -> current
+  std::vector<Association> inliers;  ///< associations that agree with it, one-to-one
 };
 
 /** What is known of one level of each image, in the pixels of these levels; refers to it. */
@@ -70,7 +70,10 @@ public:
     return threshold_;
   }
 
-  /** Robust fit to one-to-one candidates and the pairs of points they stand for; empty when no sample gave a model. */
+  /**
+   * Robust fit to one-to-one candidates; empty when no sample gave a model.
+   * @param pairs the points of each candidate, in the same order.
+   */
   virtual std::optional<PairFit> fitCandidates(const std::vector<Association>& candidates, const Correspondences& pairs,
                                                RansacStatistics& statistics, Rng& rng) const = 0;
 
@@ -93,11 +96,13 @@ public:
   virtual std::optional<Eigen::Matrix3d> mainPlane(const Eigen::Matrix3d& matrix, const Correspondences& agreeing,
                                                    Rng& rng) const = 0;
 
+  /** Number of pairs that a minimal sample has. */
   virtual int sampleSize() const = 0;
 
-  /** [px²] */
+  /** Squared error of a pair under a matrix, as the model's estimator in robust/ has it [px²]. */
   virtual double squaredError(const Eigen::Matrix3d& matrix, const Correspondence& pair) const = 0;
 
+  /** Whether the error of a pair is at most threshold(). */
   bool agrees(const Eigen::Matrix3d& matrix, const Correspondence& pair) const
   {
     return squaredError(matrix, pair) <= threshold_ * threshold_;
@@ -113,7 +118,7 @@ public:
   virtual Eigen::Matrix3d ofFullImages(const Eigen::Matrix3d& matrix, const Eigen::Matrix3d& reference_to_full,
                                        const Eigen::Matrix3d& current_to_full) const = 0;
 
-  /** For messages. */
+  /** Name of the model, for messages. */
   virtual std::string name() const = 0;
 
 protected:

@@ -10,13 +10,15 @@
 
 namespace view_servo
 {
-/** Adds the time since the last call, or since construction, to a stage. */
+/** Measures how long the stages of some work take, by a steady clock. */
 class StageClock
 {
 public:
+  /** `stages` must outlive the clock, which adds to it. */
   explicit StageClock(std::vector<StageTime>& stages) : stages_(stages), start_(Clock::now()), last_(start_)
   {
   }
+  /** Adds the time since the last call, or since the construction, to the stage of that name. */
   void finish(const std::string& stage)
   {
     const Clock::time_point now = Clock::now();
@@ -32,6 +34,7 @@ public:
     }
     stages_.push_back({ stage, ms });
   }
+  /** Time since the construction [ms]. */
   double total() const
   {
     return std::chrono::duration<double, std::milli>(Clock::now() - start_).count();

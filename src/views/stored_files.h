@@ -59,13 +59,17 @@ void replaceFile(const std::filesystem::path& path, std::string_view bytes);
 class Descriptor
 {
 public:
+  /** Opens a file; flags as open(2) takes them. */
   Descriptor(const std::filesystem::path& path, int flags);
   ~Descriptor();
   Descriptor(const Descriptor&) = delete;
   Descriptor& operator=(const Descriptor&) = delete;
 
+  /** Writes all bytes. */
   void write(std::string_view bytes) const;
+  /** Waits until what was written is on the disk. */
   void sync() const;
+  /** The descriptor itself. */
   int get() const
   {
     return fd_;
@@ -80,7 +84,7 @@ private:
 class DirectoryLock
 {
 public:
-  /** @throws std::runtime_error when another process holds it for too long. */
+  /** Waits until no other process holds the lock, and takes it. @throws std::runtime_error when that takes too long. */
   explicit DirectoryLock(const std::filesystem::path& directory);
 
 private:

@@ -36,14 +36,14 @@ struct ApproachParams
 /** Names, units and ranges of these parameters. */
 std::vector<Parameter> parameters(ApproachParams& params);
 
-/** What is known after an image or odometry. */
+/** What is known after an image or odometry. Poses are in odometry's frame. */
 struct Situation
 {
-  PlanarPose base_in_odom;
+  PlanarPose base_in_odom;  ///< the newest pose of the base
   PlanarPose goal_in_odom;  ///< the base's pose at the view
-  bool known_anew = false;  ///< an image or matches that showed the view have just come
-  bool seen = false;        ///< an image has just come in which the view's points were found
-  ShareInSight share;       ///< of the view
+  bool known_anew = false;  ///< this update is for an image or matches that showed the view
+  bool seen = false;        ///< this update is for an image in which the view's points were found
+  ShareInSight share;       ///< which share of the view the camera has in sight from a pose
 };
 
 /** Decides what a base does to reach the goal. Knows no ROS and no time. */
@@ -52,7 +52,7 @@ class ApproachLaw
 public:
   virtual ~ApproachLaw() = default;
 
-  /** After each image and each reading of odometry. */
+  /** To be called after each image and each reading of odometry. */
   virtual void update(const Situation& situation) = 0;
 
   /** What the base should do now; STAND where no way is known. */
@@ -69,8 +69,9 @@ public:
 };
 
 /**
- * The parameters must be valid.
- * @param most_tolerance where corrections do not help, a DIFFERENTIAL base's tolerance grows up to it [m].
+ * The law for params.base. The parameters must be valid.
+ * @param most_tolerance the largest tolerance() of a DIFFERENTIAL base [m]: each time that corrections have not brought it
+ * within tolerance(), the tolerance grows, until this. A HOLONOMIC base's tolerance() does not change.
  */
 std::unique_ptr<ApproachLaw> makeApproachLaw(const ApproachParams& params, double most_tolerance);
 

@@ -37,11 +37,12 @@ struct ArrivalDetectorParams
 /** Names, units and ranges of these parameters, by which validate() checks them. */
 std::vector<Parameter> parameters(ArrivalDetectorParams& params);
 
+/** How far an approach has come. */
 enum class Arrival
 {
-  APPROACHING,
-  NEAR,    ///< the similarity has risen suddenly
-  REACHED  ///< it has dropped again since
+  APPROACHING,  ///< the similarity has not risen suddenly yet
+  NEAR,         ///< the similarity has risen suddenly
+  REACHED       ///< it has dropped again since
 };
 
 /** Decides from the similarity of the current with the stored view, step after step, when to stop (thesis 5.3). */
@@ -63,9 +64,9 @@ public:
 private:
   ArrivalDetectorParams params_;
   Arrival state_ = Arrival::APPROACHING;
-  std::vector<double> history_;  ///< before the rise
-  double last_ = 0.0;
-  double largest_ = 0.0;  ///< since the rise
+  std::vector<double> history_;  ///< similarities before the rise, oldest first
+  double last_ = 0.0;            ///< the similarity added last
+  double largest_ = 0.0;         ///< largest similarity since the rise
 };
 
 }  // namespace view_servo

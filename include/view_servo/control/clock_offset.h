@@ -10,8 +10,8 @@ namespace view_servo
 {
 /**
  * How far the stamps of odometry and images are apart, from the turns of a base: what the images say of them has to be
- * what odometry says, at another time. Only turns that begin, end or change tell; those of one speed look the same at
- * all times. Where the begin of a turn is not seen, odometry that turns 5 % too much looks as if it were 50 ms late.
+ * what odometry says, at another time. Only turns that begin, end or change show the offset; a turn of constant
+ * speed looks the same at all times. Where the begin of a turn is not seen, odometry that turns 5 % too much looks as if it were 50 ms late.
  * Times are those of the messages [s], angles are [rad].
  */
 class ClockOffset
@@ -29,8 +29,8 @@ public:
    */
   std::optional<double> estimate() const;
 
-  static constexpr double LARGEST = 0.6;  ///< largest offset that is looked for [s]
-  static constexpr std::size_t FEWEST_IMAGES = 15;
+  static constexpr double LARGEST = 0.6;            ///< largest offset that is looked for [s]
+  static constexpr std::size_t FEWEST_IMAGES = 15;  ///< estimate() is empty until so many images are known
 
 private:
   struct Sample
@@ -41,16 +41,17 @@ private:
 
   struct Fit
   {
-    double unexplained = 0.0;  // what remains of the view's turns, a mean [rad]
-    std::optional<double> offset;
+    double unexplained = 0.0;      // mean difference of the view's turns from what odometry explains of them [rad]
+    std::optional<double> offset;  // odometry's stamp minus the image's [s]; empty: not determined
   };
 
-  /** @param turn_error by which part odometry may turn too much or too little. */
+  /** The best offset when odometry measures turns too large or too small by at most this part of them. */
   Fit fit(double turn_error) const;
+  /** Unwrapped yaw by odometry at a time, interpolated [rad]. */
   double odometryAt(double stamp) const;
 
-  std::deque<Sample> odometry_;  // by stamp, unwrapped
-  std::deque<Sample> images_;
+  std::deque<Sample> odometry_;  // oldest first; yaw of the base, unwrapped
+  std::deque<Sample> images_;    // oldest first; yaw of the view, unwrapped
 };
 
 }  // namespace view_servo

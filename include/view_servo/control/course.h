@@ -36,12 +36,12 @@ struct Course
   double max_speed = std::numeric_limits<double>::infinity();  ///< the base is no faster, however far the end is [m/s]
 
   // TURN and LINE.
-  PlanarPose end;                   ///< TURN: its yaw; LINE: its x axis is the line. In odometry's frame.
-  double distance_tolerance = 0.0;  ///< LINE: the base stands when it is as near to the end, along the line [m]
-  double yaw_tolerance = 0.0;       ///< TURN: the base stands when it is as near to the yaw [rad]
+  PlanarPose end;                   ///< in odometry's frame; a TURN uses only its yaw; the line of a LINE is its x axis
+  double distance_tolerance = 0.0;  ///< LINE: the base stands when it is this near to the end, along the line [m]
+  double yaw_tolerance = 0.0;       ///< TURN: the base stands when it is this near to the yaw [rad]
 
   // STEP.
-  PlanarPose start;      ///< base pose at its beginning, in odometry's frame
+  PlanarPose start;      ///< base pose at the step's beginning, in odometry's frame
   double heading = 0.0;  ///< direction to drive in, in the frame of `start`, 0 = ahead, positive to the left [rad]
   double length = 0.0;   ///< distance to drive [m]
   double speed = 0.0;    ///< speed on the way; the base slows down near the end [m/s]

@@ -23,7 +23,7 @@ struct Progress
     FAILED      ///< the driver has given up
   };
   State state = PREPARING;
-  std::string reason;  ///< of the state, one line
+  std::string reason;  ///< why it is in this state, one line
 };
 
 /** What else is decisive in a cycle of control. Times are by a steady clock. */

@@ -32,7 +32,7 @@ struct HeadingHypothesesParams
   double min_significance = 6.0;
   double memory = 0.7;            ///< part of its weight that a hypothesis keeps from one set of matches to the next
   int max_hypotheses = 5;         ///< hypotheses kept at most, those of most weight
-  double assumed_distance = 1.0;  ///< distance of the view until it is known [m]
+  double assumed_distance = 1.0;  ///< distance of the view that is assumed when it is found first [m]
   std::uint64_t seed = 1;         ///< fixes all random draws
 
   /** Each fault in one line, those of nested parameters included; empty when the parameters are usable. */
@@ -50,7 +50,7 @@ struct HeadingHypothesis
    * camera is assumed at first, and later follows from odometry and that assumption.
    */
   PlanarPose view_in_odom;
-  /** The same in the level frame that the camera had at the last set of matches, scaled to distance 1. */
+  /** Pose of the view's level camera in the level camera at the last set of matches, scaled to distance 1. */
   PlanarPose view_in_camera;
   /** After each set: the weight before it times `memory`, plus the share of its matches that agree, if enough do. */
   double weight = 0.0;
@@ -90,7 +90,9 @@ private:
   /** The motion that most matches agree with; empty when chance explains that many. */
   std::optional<RelativePose> suggest(const Correspondences& matches);
   RelativePose refine(const RelativePose& motion, const Correspondences& support) const;
+  /** Drops all but the max_hypotheses of most weight, and sorts these. */
   void keepTheBest();
+  /** Updates a hypothesis by the matches that agree with it; without enough of them its support becomes empty. */
   void confirm(HeadingHypothesis& hypothesis, const Correspondences& matches, const PlanarPose& camera_in_odom);
 
   HeadingHypothesesParams params_;

@@ -25,12 +25,12 @@ struct HeadingEvidence
 /** Options of the heading vote. */
 struct HeadingVoteParams
 {
-  int bins = 181;               ///< of the histogram of headings
+  int bins = 181;               ///< number of bins of the histogram of headings
   double margin = 0.17;         ///< K: headings closer than this to +-pi/2 are too uncertain to be chosen [rad]
   double smoothing = 0.02;      ///< standard deviation of the Gaussian over which a vote is spread [rad]
-  double narrowing = 0.7;       ///< factor of the region's width when the highest peak of all is inside
-  double widening = 1.3;        ///< factor of the region's width when it is outside
-  double min_half_width = 0.1;  ///< of the region [rad]
+  double narrowing = 0.7;       ///< factor of the region's width when the highest peak of all lies inside it
+  double widening = 1.3;        ///< factor of the region's width when the highest peak of all lies outside it
+  double min_half_width = 0.1;  ///< least half width of the region [rad]
 
   /** Each fault in one line, those of nested parameters included; empty when the parameters are usable. */
   std::vector<std::string> validate() const;
@@ -49,9 +49,13 @@ class HeadingHistogram
 {
 public:
   HeadingHistogram() = default;
-  /** @param yaw of the reference camera in the current one [rad]; 0 in the thesis, which forbids rotation. */
+  /**
+   * @param evidence matches as level points. @param yaw of the reference camera in the current one [rad]; 0 in the thesis,
+   * which forbids rotation.
+   */
   HeadingHistogram(const HeadingEvidence& evidence, double yaw, const HeadingVoteParams& params);
 
+  /** The votes of each bin, from right to left. */
   const std::vector<double>& votes() const
   {
     return votes_;
@@ -73,7 +77,9 @@ class HeadingRegion
 public:
   explicit HeadingRegion(const HeadingVoteParams& params);
 
+  /** Right end of the region [rad]. */
   double min() const;
+  /** Left end of the region [rad]. */
   double max() const;
 
   /**
@@ -84,8 +90,8 @@ public:
 
 private:
   HeadingVoteParams params_;
-  double centre_ = 0.0;
-  double half_width_;
+  double centre_ = 0.0;  // [rad]
+  double half_width_;    // [rad]
 };
 
 }  // namespace view_servo

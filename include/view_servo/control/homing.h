@@ -55,8 +55,8 @@ struct HomingParams
 
   // Mode THESIS.
   double step = 0.02;        ///< length of a step, after which the heading is found anew [m]
-  double near_step = 0.01;   ///< the same after the rise of the correlation [m]
-  double step_speed = 0.08;  ///< [m/s]
+  double near_step = 0.01;   ///< length of a step once the similarity has risen suddenly [m]
+  double step_speed = 0.08;  ///< speed on a step [m/s]
 
   /** Each fault in one line, those of nested parameters included; empty when the parameters are usable. */
   std::vector<std::string> validate() const;
@@ -81,9 +81,9 @@ struct HomingReport
 {
   double stamp = 0.0;  ///< stamp of the last image [s]; 0 before the first
   HomingState state = HomingState::ACQUIRING;
-  std::string reason;     ///< of the state, in one line
+  std::string reason;     ///< why it is in this state, in one line
   std::string manoeuvre;  ///< what a base that cannot slide does at the moment; empty: nothing worth a word
-  bool at_view = false;   ///< within arrival_distance and arrival_yaw, and the image looks like it
+  bool at_view = false;   ///< the base is within arrival_distance and arrival_yaw, and the image looks like the view
   /** Direction to the view's base pose in base_link, positive to the left [rad]. */
   double heading = std::numeric_limits<double>::quiet_NaN();
   double yaw_error = std::numeric_limits<double>::quiet_NaN();  ///< angle left to turn, positive to the left [rad]
@@ -104,11 +104,11 @@ struct HomingReport
    * [px].
    */
   double displacement = std::numeric_limits<double>::quiet_NaN();
-  bool tracked = false;  ///< the view's points were found in the last image; without, the way is known by matches alone
-  int inliers = 0;       ///< number of matches or points that agree; mode THESIS: of all matches
+  bool tracked = false;  ///< the view's points were found in the last image; if not, only matches show the way
+  int inliers = 0;       ///< number of matches or tracked points that agree; mode THESIS: number of all matches
   /** The base's pose at the view, in odometry's frame; empty until its distance is known in metres, and when it is lost. */
   std::optional<PlanarPose> goal_in_odom;
-  Eigen::Matrix3d goal_covariance = Eigen::Matrix3d::Zero();  ///< of its (x, y, yaw) [m, rad]
+  Eigen::Matrix3d goal_covariance = Eigen::Matrix3d::Zero();  ///< covariance of (x, y, yaw) of goal_in_odom [m, rad]
   /** How much later than images odometry is stamped; see ClockOffset [s]. */
   double odometry_delay = std::numeric_limits<double>::quiet_NaN();
 };
@@ -205,11 +205,11 @@ protected:
   OdometryHistory odometry_;
   ClockOffset clocks_;
   HomingReport report_;
-  double started_;     ///< stamp of the first image; NaN before it
-  double last_trace_;  ///< stamp of the last image or matches that showed the view
+  double started_;     ///< stamp of the first image [s]; NaN before it
+  double last_trace_;  ///< stamp of the last image or matches that showed the view [s]
 
 private:
-  cv::Mat reference_gradients_;
+  cv::Mat reference_gradients_;  // gradientMagnitude() of the stored view
 };
 
 /** @throws std::invalid_argument with all faults of the parameters, or saying what the target lacks. */

@@ -17,7 +17,7 @@ class InputWatch
 public:
   using Clock = std::chrono::steady_clock;
 
-  /** @param timeout [s]. */
+  /** @param timeout largest age() of input that is not stale [s]. */
   explicit InputWatch(double timeout) : timeout_(timeout)
   {
   }
@@ -34,11 +34,13 @@ public:
     return std::chrono::duration<double>(Clock::now() - last_.load()).count();
   }
 
+  /** Whether age() exceeds the timeout. */
   bool stale() const
   {
     return age() > timeout_;
   }
 
+  /** As given to the constructor [s]. */
   double timeout() const
   {
     return timeout_;

@@ -8,7 +8,7 @@
 
 namespace view_servo
 {
-/** The range of a joint's positions [rad] or [m]. */
+/** The range of a joint's positions: [rad] of one that turns, [m] of one that slides. */
 struct JointLimits
 {
   double lower;
@@ -29,10 +29,11 @@ public:
   JointGuard(std::map<std::string, JointLimits> limits, double margin, double max_age);
 
   /**
-   * Where joints are. Those without limits are ignored, and some may be missing.
-   * @param velocities as many as positions; if not, they are computed from the positions.
-   * @return a message naming a position that is ignored, as it is no number or lies far beyond the limits; empty: none
-   * is.
+   * Takes where joints are: a position [rad or m] for each name. Joints without limits are ignored, and some may be
+   * missing.
+   * @param velocities one for each name [rad/s or m/s]; when there are fewer or more, they are computed from the positions.
+   * @return a message naming a position that is ignored because it is not a finite number or lies far beyond the limits;
+   * empty when no position is ignored.
    */
   std::string add(double time, const std::vector<std::string>& names, const std::vector<double>& positions,
                   const std::vector<double>& velocities);
@@ -47,6 +48,7 @@ public:
   /** Called when the arm is not to move: the time that joints have been at their limits begins anew. */
   void clearStuck();
 
+  /** Whether there are no limits, so that nothing is watched. */
   bool empty() const
   {
     return limits_.empty();
@@ -55,16 +57,17 @@ public:
 private:
   struct Joint
   {
-    double time;
-    double position;
-    double velocity;
+    double time;      // [s]
+    double position;  // [rad] or [m]
+    double velocity;  // [rad/s] or [m/s]
   };
 
   std::map<std::string, JointLimits> limits_;
   double margin_;
   double max_age_;
   std::map<std::string, Joint> joints_;
-  std::map<std::string, double> stuck_since_;
+  std::map<std::string, double>
+      stuck_since_;  // by joint: the time since which it is at a limit while the arm should move
 };
 
 }  // namespace view_servo

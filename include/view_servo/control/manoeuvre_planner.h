@@ -19,8 +19,8 @@ namespace view_servo
 /** A straight part of a manoeuvre. Before it the base turns on the spot. */
 struct Leg
 {
-  PlanarPose end;          ///< where it ends; its yaw is the base's on the whole leg
-  bool backwards = false;  ///< the base drives back
+  PlanarPose end;          ///< where the leg ends; on the whole leg the base has this yaw
+  bool backwards = false;  ///< the base drives backwards
 };
 
 /** Turns and legs in turn; after the last leg, which ends at the goal, the base turns to yaw 0. */
@@ -29,19 +29,20 @@ struct Manoeuvre
   std::vector<Leg> legs;
   double least_share = 1.0;     ///< least share of the view in sight on the way, [0, 1]
   double blind_distance = 0.0;  ///< length of the way with too little of the view in sight [m]
-  double blind_turn = 0.0;      ///< the same of its turns [rad]
-  double duration = 0.0;        ///< estimate, for a base that drives 0.25 m/s and turns 0.4 rad/s [s]
+  double blind_turn = 0.0;      ///< angle of the turns with too little of the view in sight [rad]
+  double duration = 0.0;        ///< estimated time, for a base that drives 0.25 m/s and turns 0.4 rad/s [s]
 };
 
 /** Options of manoeuvres. */
 struct ManoeuvreParams
 {
-  double min_share = 0.4;           ///< share of the view to keep in sight, if there is a way that does
-  double blind_share = 0.15;        ///< with less of it in sight, the base is blind
+  double min_share = 0.4;           ///< share of the view that is kept in sight where some way allows it, [0, 1]
+  double blind_share = 0.15;        ///< the base counts as blind where a smaller share of the view is in sight, [0, 1]
   double max_blind_distance = 0.3;  ///< longest way that the base may drive blindly [m]
   double max_blind_turn = 0.5;      ///< largest angle that it may turn blindly [rad]
-  double max_retreat = 1.0;         ///< longest way back beyond both its start and the goal: nothing is seen behind [m]
-  double straight_end = 0.3;        ///< least length of the last leg, which lies along the goal's x axis [m]
+  double max_retreat =
+      1.0;  ///< how far the base may back up behind both its start and the goal, where it sees nothing [m]
+  double straight_end = 0.3;  ///< least length of the last leg, which lies along the goal's x axis [m]
 };
 
 /** Names, units and ranges of these parameters. */

@@ -40,16 +40,17 @@ private:
   struct Moment
   {
     double time;            // [s]
-    PlanarPose in_odom;     // of the base
-    PlanarPose by_command;  // where it would be by the commands alone
+    PlanarPose in_odom;     // pose of the base by odometry
+    PlanarPose by_command;  // pose of the base by the commands alone, from an arbitrary start
   };
 
+  /** Moves by_command_ on to a time, by the last command. */
   void advance(double time);
 
   BaseVelocity command_ = BaseVelocity::Zero();
-  double time_ = 0.0;  // to which by_command_ leads [s]
-  PlanarPose by_command_;
-  std::deque<Moment> moments_;  // while the base has been told to move all the time
+  double time_ = 0.0;           // the time that by_command_ is of [s]
+  PlanarPose by_command_;       // where the base would be at time_ by the commands alone
+  std::deque<Moment> moments_;  // oldest first; since when the base has been told to move without a break
 };
 
 }  // namespace view_servo

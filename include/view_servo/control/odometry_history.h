@@ -13,7 +13,7 @@ namespace view_servo
 class OdometryHistory
 {
 public:
-  /** @param duration kept [s]. */
+  /** @param duration poses older than the newest one by more than this are forgotten [s]. */
   explicit OdometryHistory(double duration) : duration_(duration)
   {
   }
@@ -30,6 +30,7 @@ public:
    */
   std::optional<PlanarPose> at(double stamp, double reach = 0.2) const;
 
+  /** The pose with the newest stamp; empty without any. */
   std::optional<PlanarPose> newest() const;
 
 private:
@@ -40,7 +41,7 @@ private:
   };
 
   double duration_;
-  std::deque<Entry> entries_;
+  std::deque<Entry> entries_;  // oldest first
 };
 
 }  // namespace view_servo

@@ -19,12 +19,13 @@ namespace view_servo
 /** Options of following a route. */
 struct RouteGuideParams
 {
-  double handover_distance = 0.3;  ///< as near to a view, the next one is driven to [m]
-  double handover_turn = 0.15;     ///< largest yaw error at that [rad]
-  /** The next view is driven to also where the median displacement of this one's points is as small [px]. */
+  /** The base goes on to the next view when it is this near to the present one [m]. */
+  double handover_distance = 0.3;
+  double handover_turn = 0.15;  ///< largest yaw error at which it then goes on [rad]
+  /** It also goes on when the median displacement of the present view's points is at most this [px]. */
   double handover_displacement = 5.0;
-  double blind_distance = 0.5;  ///< longest way by odometry until the next view is found [m]
-  double blind_turn = 0.35;     ///< largest turn by odometry until then [rad]
+  double blind_distance = 0.5;  ///< longest way that the base drives by odometry until the next view is found [m]
+  double blind_turn = 0.35;     ///< largest angle that the base turns by odometry until the next view is found [rad]
 };
 
 /** Names, units and ranges of these parameters. */
@@ -54,15 +55,17 @@ public:
   {
     return stops_[index_].view;
   }
-  /** Its number, from 1, of all on the way. */
+  /** Number of view() in the order in which the stops are driven to, from 1. */
   std::size_t number() const
   {
     return index_ + 1;
   }
+  /** Number of stops. */
   std::size_t count() const
   {
     return stops_.size();
   }
+  /** Whether view() is the last one. */
   bool last() const
   {
     return index_ + 1 == stops_.size();
@@ -73,7 +76,7 @@ public:
     return last() ? "" : stops_[index_ + 1].view;
   }
 
-  /** To be called after each image with what homing to view() knows. */
+  /** To be called after each image, with what homing to view() knows and the base's pose. */
   void see(const HomingReport& report, const PlanarPose& base);
   /** To be called with each reading of odometry. */
   void move(const PlanarPose& base);
@@ -85,7 +88,7 @@ public:
   }
   /** From now on the next view is homed to. There has to be one. */
   void goOn();
-  /** From now on this view is homed to, and nothing is known of where it is. It has to be on the way. */
+  /** From now on `view` is homed to, which has to be one of the stops; nothing is known yet of where it is. */
   void goTo(const std::string& view);
 
   /**
@@ -98,7 +101,7 @@ public:
   struct Deviation
   {
     double sideways = std::numeric_limits<double>::quiet_NaN();  ///< from the line, positive to its left [m]
-    double yaw = std::numeric_limits<double>::quiet_NaN();       ///< against the recorded one [rad]
+    double yaw = std::numeric_limits<double>::quiet_NaN();       ///< yaw of the base less the recorded one [rad]
   };
   Deviation deviation(const PlanarPose& base) const;
 
@@ -109,10 +112,10 @@ private:
   std::size_t index_ = 0;
   bool due_ = false;
   bool found_ = false;              // homing knows the way to view()
-  std::optional<PlanarPose> goal_;  // at view()
-  std::optional<PlanarPose> base_;  // the newest
-  double blind_distance_ = 0.0;     // since the way was known last [m]
-  double blind_turn_ = 0.0;         // [rad]
+  std::optional<PlanarPose> goal_;  // the base's pose at view()
+  std::optional<PlanarPose> base_;  // the newest pose of the base
+  double blind_distance_ = 0.0;     // driven since homing knew the way last [m]
+  double blind_turn_ = 0.0;         // turned since homing knew the way last [rad]
 };
 
 }  // namespace view_servo

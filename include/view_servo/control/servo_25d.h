@@ -21,14 +21,14 @@ namespace view_servo
 /** Options of 2.5D servoing. */
 struct Servo25dParams
 {
-  double gain = 1.0;                     ///< rate at which a large error decays [1/s]
-  double near_gain = 2.5;                ///< rate at which a small error decays [1/s]
-  double margin = 0.1;                   ///< strip along each border without the chosen point, over the image's size
-  double distance = 0.5;                 ///< d: distance of the plane from the stored view, until it is known [m]
+  double gain = 1.0;       ///< rate at which a large error decays [1/s]
+  double near_gain = 2.5;  ///< rate at which a small error decays [1/s]
+  double margin = 0.1;     ///< strip along each border kept free of the chosen point, as a part of the size
+  double distance = 0.5;   ///< d: distance of the plane from the stored view, until it is known [m]
   double translation_tolerance = 0.001;  ///< error of the camera's position at which it has converged [m]
   double rotation_tolerance = 0.0015;    ///< error of its rotation at which it has converged [rad]
   double dwell = 0.5;                    ///< time that it has to stay within both tolerances [s]
-  double loss_tolerance = 0.12;          ///< time without the view that sent commands bridge; then it stands [s]
+  double loss_tolerance = 0.12;          ///< how long the camera drives on without the view, by the commands sent [s]
   double lost_timeout = 5.0;             ///< servoing gives up after this time without the view [s]
 
   /** Each fault in one line, those of nested parameters included; empty when the parameters are usable. */
@@ -60,13 +60,17 @@ struct Servo25dError
 {
   Eigen::Vector2d point = Eigen::Vector2d::Zero();  ///< (x - x*, y - y*) of the chosen point, in normalised coordinates
   double depth = 0.0;  ///< log(Z / Z*) of the chosen point: its depth now over that in the stored view
-  Eigen::Vector3d rotation = Eigen::Vector3d::
-      Zero();  ///< θu, axis times angle: by it the camera is turned from where the view was stored [rad]
+  /**
+   * θu: axis times angle of the rotation that turns the camera from where the view was stored to where it is now [rad]. The
+   * axis has the same coordinates in the optical frames of both.
+   */
+  Eigen::Vector3d rotation = Eigen::Vector3d::Zero();
 };
 
-/** @param point the chosen point (x*, y*) of the stored view, in normalised coordinates. */
+/** The error after a motion. @param point the chosen point (x*, y*) of the stored view, in normalised coordinates. */
 Servo25dError servo25dError(const EuclideanHomography& motion, const Eigen::Vector2d& point);
 
+/** What servoing does. */
 enum class ServoState
 {
   ACQUIRING,  ///< the view has not been found yet
@@ -80,21 +84,21 @@ enum class ServoState
 struct ServoReport
 {
   ServoState state = ServoState::ACQUIRING;
-  std::string reason = "looks for the view";  ///< one line
+  std::string reason = "looks for the view";  ///< why it is in this state, one line
   /** Distance of the camera from the view [m], by the distance of the plane that is assumed until it is known. */
   double translation_error = std::numeric_limits<double>::quiet_NaN();
   /** Angle by which the camera is turned from the view [rad]. */
   double rotation_error = std::numeric_limits<double>::quiet_NaN();
   double point_error = std::numeric_limits<double>::quiet_NaN();  ///< distance of the chosen point from its place [px]
-  std::optional<Servo25dError> error;  ///< of the last image with the plane; empty before one
-  /** Where the chosen point is [px]. */
+  std::optional<Servo25dError> error;  ///< error at the last image in which the plane was found; empty before the first
+  /** Where the chosen point was in the last image with the plane [px]. */
   Eigen::Vector2d point = Eigen::Vector2d::Constant(std::numeric_limits<double>::quiet_NaN());
   /**
    * How much the margin slows turning and changes of depth, for the chosen point's x and y, in [0, 1]: 0 is at the
    * margin, 1 is free. The smaller of the two counts.
    */
   Eigen::Vector2d gains = Eigen::Vector2d::Ones();
-  int inliers = 0;  ///< of the last image's homography; 0 when the plane was not found
+  int inliers = 0;  ///< points that agree with the last image's homography; 0 when the plane was not found
 };
 
 /** How far a goal has come. While it drives the reason stays the same, though numbers change. */
@@ -152,13 +156,15 @@ private:
   struct Task;
   struct Sent
   {
-    double time;
+    double time;  // from which on the camera follows it [s]
     Twist twist;
   };
 
   /** How the camera has moved by the twists that were sent: X_end = motion X_begin. */
   Eigen::Isometry3d motionSince(double begin, double end) const;
+  /** ServoReport::gains of a chosen point at a pixel. */
   Eigen::Vector2d gainsAt(const Eigen::Vector2d& pixel) const;
+  /** d, or params.distance while that is not known [m]. */
   double distance() const;
   void updateReport(double stamp);
 
@@ -169,8 +175,9 @@ private:
   std::optional<PlaneView> view_;   // the last one
   std::optional<double> distance_;  // d, once it is known [m]
   std::deque<Sent> sent_;
-  std::optional<double> lost_since_;
-  std::optional<double> within_since_;
+  std::optional<double> lost_since_;  // stamp of the first image without the view [s]; empty while it is seen
+  std::optional<double>
+      within_since_;  // stamp since which both errors are within tolerance [s]; empty while they are not
   ServoReport report_;
 };
 

@@ -15,20 +15,20 @@ namespace view_servo
 /** When an arm counts as standing still. */
 struct StillPoseParams
 {
-  double duration = 0.8;          ///< for how long [s]
-  std::size_t min_samples = 5;    ///< seen at least so often
+  double duration = 0.8;          ///< how long it has to stand [s]
+  std::size_t min_samples = 5;    ///< least number of samples in that time
   double max_gap = 0.5;           ///< longest time between two samples [s]
-  double max_translation = 1e-3;  ///< of the flange from its mean place [m]
-  double max_rotation = 2e-3;     ///< of the flange from its mean direction [rad]
-  double max_pixels = 0.5;        ///< of each point in the image from its mean place [px]
+  double max_translation = 1e-3;  ///< largest distance of the flange from its mean place [m]
+  double max_rotation = 2e-3;     ///< largest angle between the flange and its mean orientation [rad]
+  double max_pixels = 0.5;        ///< largest distance of a point in the image from its mean place [px]
 };
 
-/** What an arm that carries a camera says at one moment. */
+/** Where an arm and what its camera sees are at one moment. */
 struct ArmSample
 {
   double stamp = 0.0;                                                ///< of the image [s]
-  Eigen::Isometry3d flange_in_base = Eigen::Isometry3d::Identity();  ///< at that time [m]
-  Points seen;                                                       ///< where some points are in the image [px]
+  Eigen::Isometry3d flange_in_base = Eigen::Isometry3d::Identity();  ///< pose of the flange at that time [m]
+  Points seen;  ///< where some points of a plane are in the image [px], in the same order in each sample
 };
 
 /** Waits until both an arm and what its camera sees stand still, and averages over that time. */

@@ -21,10 +21,10 @@ using Twist = Eigen::Matrix<double, 6, 1>;
 /** Limits of the motion of a base or a camera. */
 struct VelocityLimits
 {
-  double max_speed = 0.25;             ///< [m/s]
-  double max_turn_rate = 0.4;          ///< [rad/s]
-  double max_acceleration = 0.5;       ///< [m/s²]
-  double max_turn_acceleration = 1.0;  ///< [rad/s²]
+  double max_speed = 0.25;             ///< largest norm of the linear velocity [m/s]
+  double max_turn_rate = 0.4;          ///< largest norm of the angular velocity [rad/s]
+  double max_acceleration = 0.5;       ///< largest change of the linear velocity [m/s²]
+  double max_turn_acceleration = 1.0;  ///< largest change of the angular velocity [rad/s²]
 
   /** Each fault in one line, those of nested parameters included; empty when the parameters are usable. */
   std::vector<std::string> validate() const;
@@ -74,7 +74,7 @@ public:
     velocity_ *= scaleWithin(velocity_, limits_.max_speed, limits_.max_turn_rate);
   }
 
-  /** Zero at once. */
+  /** The velocity is zero at once, whatever the limits of acceleration. */
   void stop()
   {
     velocity_.setZero();
@@ -90,7 +90,7 @@ private:
   }
 
   VelocityLimits limits_;
-  Velocity velocity_ = Velocity::Zero();
+  Velocity velocity_ = Velocity::Zero();  // allowed last
 };
 
 using BaseVelocityLimiter = VelocityLimiter<2, 1>;

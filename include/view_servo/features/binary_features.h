@@ -44,17 +44,17 @@ inline int hammingDistance(const BinaryWord& a, const BinaryWord& b)
 /** A corner, described for finding views that show it. */
 struct BinaryFeature
 {
-  BinaryWord word{};
-  std::uint8_t angle = 0;  ///< direction of the patch, which its word is relative to [1/256 of a turn, x towards y]
+  BinaryWord word{};       ///< descriptor of the patch around the corner
+  std::uint8_t angle = 0;  ///< direction of the patch, to which its word refers: [1/256 turn] from x towards y
 };
 
 /** Options of detectBinaryFeatures(). */
 struct BinaryFeatureParams
 {
-  int max_features = 500;  ///< the strongest corners of all scales together
-  int scales = 8;          ///< each is the image reduced by `scale_factor` once more
-  double scale_factor = 1.2;
-  int fast_threshold = 7;  ///< least difference of grey values around a corner; low, for images with little light
+  int max_features = 500;     ///< the strongest corners of all scales together
+  int scales = 8;             ///< number of scales, each the image of the one before divided by `scale_factor`
+  double scale_factor = 1.2;  ///< ratio of the sizes of two neighbouring scales, > 1
+  int fast_threshold = 7;     ///< least difference of grey values around a corner; low, for images with little light
 
   /** Each fault in one line; empty when the parameters are usable. */
   std::vector<std::string> validate() const;

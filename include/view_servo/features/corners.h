@@ -18,9 +18,9 @@ struct CornerParams
   int max_corners = 500;            ///< the strongest are kept
   double derivative_sigma = 0.7;    ///< Gaussian derivative scale [px]
   double integration_sigma = 1.4;   ///< Gaussian window of the second-moment matrix [px]
-  double k = 0.04;                  ///< the weight of the trace in R = det(M) - k tr(M)²
+  double k = 0.04;                  ///< weight of the trace in the Harris measure R = det(M) - k tr(M)²
   double min_distance = 2.0;        ///< no two corners closer than this [px]
-  double relative_threshold = 0.0;  ///< weaker corners are left out: smallest response, as a fraction of the strongest
+  double relative_threshold = 0.0;  ///< least response of a corner that is kept, as a fraction of the strongest, [0, 1)
   int border = 4;                   ///< no corners closer than this to the image's border [px]
 
   /** Each fault in one line, those of nested parameters included; empty when the parameters are usable. */
@@ -33,8 +33,8 @@ std::vector<Parameter> parameters(CornerParams& params);
 /** A corner: sub-pixel position [px], (0, 0) at the centre of the top-left pixel. */
 struct Corner
 {
-  Eigen::Vector2d position;
-  float response;  ///< Harris measure R of eq. 2.24 (grey levels⁴)
+  Eigen::Vector2d position;  ///< [px]
+  float response;            ///< Harris measure R of eq. 2.24 (grey levels⁴)
 };
 
 /**

@@ -18,7 +18,7 @@ struct EdgeParams
   double sigma = 1.0;           ///< Gaussian derivative scale [px]
   double low_threshold = 2.0;   ///< least gradient of every pixel of a chain [grey levels/px]
   double high_threshold = 4.0;  ///< least gradient of one pixel of a chain [grey levels/px]
-  int min_points = 5;           ///< pixels of the shortest chain that is kept
+  int min_points = 5;           ///< least number of pixels of a chain that is kept
 
   /** Each fault in one line, those of nested parameters included; empty when the parameters are usable. */
   std::vector<std::string> validate() const;
@@ -27,7 +27,7 @@ struct EdgeParams
 /** Names, units and ranges of these parameters, by which validate() checks them. */
 std::vector<Parameter> parameters(EdgeParams& params);
 
-/** The rows of those that LineSegmentParams has as well. */
+/** The rows of these three parameters, which EdgeParams and LineSegmentParams share. */
 std::vector<Parameter> edgeParameters(double& sigma, double& low_threshold, double& high_threshold);
 
 /**

@@ -27,7 +27,7 @@ struct ProfileParams
   double max_length = 200.0;  ///< D_c: longest profile (RADIUS) [px]
   double min_length = 10.0;   ///< shortest profile [px]
   int coefficients = 8;       ///< N_f: number of Fourier features of a profile: 4, 6 or 8
-  double min_contrast = 6.0;  ///< profiles that differ less than this from their mean are left out [grey levels]
+  double min_contrast = 6.0;  ///< least value of max|p - mean| of a profile p that is kept [grey levels]
 
   /** Each fault in one line, those of nested parameters included; empty when the parameters are usable. */
   std::vector<std::string> validate() const;
@@ -56,6 +56,7 @@ struct ProfileSet
   std::vector<Pair> pairs;      ///< the ends of each profile
   std::vector<float> features;  ///< pairs.size() x coefficients, row-major
 
+  /** The `coefficients` features of the profile with index `pair` in `pairs`. */
   const float* feature(std::size_t pair) const
   {
     return features.data() + pair * static_cast<std::size_t>(coefficients);

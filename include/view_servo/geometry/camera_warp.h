@@ -26,11 +26,12 @@ public:
   {
     return active_;
   }
-  /** What images are turned into. */
+  /** The camera whose images image() returns. */
   const Camera& to() const
   {
     return to_;
   }
+  /** Size of the images that image() returns [px]. */
   cv::Size size() const
   {
     return { to_.width, to_.height };
@@ -63,9 +64,10 @@ private:
   Camera to_;
   Eigen::Matrix3d rotation_;  // frame of `from` -> frame of `to`
   bool active_;
-  mutable cv::Mat positions_;  // for each pixel of `to`, where it is in `from`; made when needed
-  mutable cv::Mat weights_;
-  mutable cv::Mat seen_;  // 255 where `from` saw it
+  mutable cv::Mat
+      positions_;  // for each pixel of `to`, where it is in `from`; made when needed, in the form of cv::remap
+  mutable cv::Mat weights_;  // the second map that cv::remap takes beside positions_
+  mutable cv::Mat seen_;     // 255 where `from` saw it
 };
 
 }  // namespace view_servo

@@ -27,7 +27,7 @@ struct RelativePose
 /** [v]x: the matrix whose product with w is v × w. */
 Eigen::Matrix3d crossMatrix(const Eigen::Vector3d& v);
 
-/** The up to ten essential matrices of exactly five correspondences (Nistér 2004). */
+/** The essential matrices of exactly five correspondences, ten at most (Nistér 2004); none for another number of them. */
 std::vector<Eigen::Matrix3d> essentialFromFivePoints(const Correspondences& five);
 
 /** The four motions that give an essential matrix; with at most one of them, points lie in front of both cameras. */

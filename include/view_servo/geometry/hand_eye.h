@@ -26,33 +26,34 @@ struct HandEyeView
   Points corners;  ///< of the region that shows the plane [px]: four, no three of them on one line
 };
 
-/** What is known where the arm stood still. */
+/** What is known of one pose in which the arm stood still. */
 struct HandEyePose
 {
   Eigen::Isometry3d flange_in_base = Eigen::Isometry3d::Identity();  ///< by the arm's joints [m]
   Eigen::Matrix3d h = Eigen::Matrix3d::Identity();  ///< x_cur ~ H x_view of the plane, 3x3, any scale [px]
 };
 
-/** How much motion is asked for. */
+/** How much motion a calibration needs, and how certain its result has to be. */
 struct HandEyeParams
 {
-  int min_poses = 8;                     ///< that differ from one another, at least 6
-  double min_rotation = 0.35;            ///< about some axis, between two poses [rad]
-  double min_second_rotation = 0.2;      ///< about an axis square to that, between two poses [rad]
-  double min_travel = 0.15;              ///< of the camera between two poses, as a part of the plane's distance
-  double max_translation_sigma = 0.005;  ///< of the result along its least certain direction [m]
-  double max_rotation_sigma = 0.0175;    ///< likewise [rad]
-  /** Of the plane from the view's camera, along its normal, where somebody has measured it [m]; NaN: not known. */
+  int min_poses = 8;                 ///< least number of poses that differ from one another, >= 6
+  double min_rotation = 0.35;        ///< least angle between two poses about the main axis of all rotations [rad]
+  double min_second_rotation = 0.2;  ///< least angle between two poses about an axis at right angles to that [rad]
+  double min_travel = 0.15;          ///< least way of the camera between two poses, as a part of the plane's distance
+  double max_translation_sigma = 0.005;  ///< largest standard deviation of the camera's place, in any direction [m]
+  double max_rotation_sigma = 0.0175;    ///< largest standard deviation of its orientation, about any axis [rad]
+  /** Distance of the plane from the view's camera, along its normal, where somebody has measured it [m]; NaN: unknown. */
   double distance = std::numeric_limits<double>::quiet_NaN();
-  double arm_lever = 0.5;  ///< how many metres the flange is off where it is one radian off; 0.5 suits arms of 1 m
+  /** Ratio of the arm's errors of position [m] to those of rotation [rad]; 0.5 suits arms that reach about 1 m. */
+  double arm_lever = 0.5;
 };
 
 /** How far poses are from one another. */
 struct HandEyeMotion
 {
-  int poses = 0;                 ///< those that are 1 cm or 2 degrees away from each one before
+  int poses = 0;                 ///< number of poses that are 1 cm or 2 degrees away from each one before them
   double rotation = 0.0;         ///< largest angle between two poses about the main axis of all rotations [rad]
-  double second_rotation = 0.0;  ///< largest angle about an axis square to that [rad]
+  double second_rotation = 0.0;  ///< largest angle about an axis at right angles to that [rad]
   double travel = 0.0;           ///< largest way of the camera between two poses, as a part of the plane's distance
 };
 
@@ -72,9 +73,9 @@ struct HandEyeResult
   std::string message;               ///< why nothing was found, in one line; empty when it was
   std::vector<std::string> missing;  ///< motion that is lacking, a line each, with what to do about it
 
-  Eigen::Isometry3d camera_in_flange = Eigen::Isometry3d::Identity();  ///< pose of the optical frame [m]
+  Eigen::Isometry3d camera_in_flange = Eigen::Isometry3d::Identity();  ///< pose of the optical frame in the flange [m]
   /**
-   * Of `camera_in_flange`: position [m], then rotation vector [rad], both along the flange's axes, so that the truth is
+   * Covariance of `camera_in_flange`: position [m], then rotation vector [rad], both along the flange's axes, so that the truth is
    * (t + δt, exp(δr) R).
    */
   Eigen::Matrix<double, 6, 6> covariance = Eigen::Matrix<double, 6, 6>::Zero();
@@ -88,9 +89,9 @@ struct HandEyeResult
   std::vector<HandEyeResidual> residuals;  ///< one a pose
   HandEyeMotion motion;                    ///< of the poses that were used
 
-  /** Standard deviation along the least certain direction [m]. */
+  /** Standard deviation of the camera's place along the least certain direction [m]. */
   double translationSigma() const;
-  /** Likewise [rad]. */
+  /** Standard deviation of the camera's rotation about the least certain axis [rad]. */
   double rotationSigma() const;
 };
 

@@ -63,9 +63,9 @@ std::optional<Segment> transfer(const Eigen::Matrix3d& h, const Segment& segment
 struct SegmentAgreement
 {
   double distance;  ///< largest distance between them, across, where they lie side by side [px]
-  double cosine;    ///< of the angle from the one to the other, in [-1, 1]
-  double overlap;   ///< length side by side over the length of the shorter, in [0, 1]
-  double share;     ///< length side by side over the length that both cover, in [0, 1]
+  double cosine;    ///< cosine of the angle between their directions, in [-1, 1]
+  double overlap;   ///< length of the part side by side, over the length of the shorter segment, in [0, 1]
+  double share;     ///< length of the part side by side, over the length that the two cover together, in [0, 1]
 };
 
 /** Compares two segments; the distance is infinite when no parts of them lie side by side. */

@@ -22,7 +22,7 @@ struct Segment
   Eigen::Vector2d start;
   Eigen::Vector2d end;
 
-  /** [px] */
+  /** Distance of the two ends [px]. */
   double length() const
   {
     return (end - start).norm();
@@ -45,6 +45,7 @@ struct Segment
     const Eigen::Vector2d d = direction();
     return { -d.y(), d.x() };
   }
+  /** The same segment from end to start. */
   Segment reversed() const
   {
     return { end, start };

@@ -40,6 +40,7 @@ struct InverseDepth
   double value = 0.0;        ///< 1 / z, z in the unit of the translation; negative: behind the reference camera
   double information = 0.0;  ///< squared derivative of the current level point by `value`; 0: depth unknown
 };
+/** Of a correspondence of level points, by the motion of level cameras. */
 InverseDepth inverseDepth(const Correspondence& pair, const PlanarPose& reference_in_current);
 /** The same for any motion X_cur = R X_ref + t. */
 InverseDepth inverseDepth(const Correspondence& pair, const Eigen::Matrix3d& rotation,

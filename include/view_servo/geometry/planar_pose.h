@@ -30,7 +30,7 @@ double wrapAngle(double angle);
 PlanarPose compose(const PlanarPose& b_in_a, const PlanarPose& c_in_b);
 /** Pose of B in A -> of A in B. */
 PlanarPose inverse(const PlanarPose& b_in_a);
-/** The part on the floor of a pose in space: x, y, and the yaw of its x axis. */
+/** A pose in space projected onto the floor: x, y, and the yaw of its x axis. */
 PlanarPose toPlanar(const Eigen::Isometry3d& pose);
 
 /**
@@ -55,7 +55,8 @@ struct CameraMount
   Eigen::Vector2d unlevel(const Eigen::Vector2d& point) const;
 
   /**
-   * Pose of the camera at one place in the camera at another -> of the base at the one place in the base at the other.
+   * The base's motion of a camera's motion: takes the pose of the camera at one place in the camera at another, and returns
+   * the pose of the base at the one place in the base at the other.
    */
   PlanarPose ofBase(const PlanarPose& camera_in_camera) const;
   /** The inverse of ofBase(). */

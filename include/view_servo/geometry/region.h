@@ -11,7 +11,7 @@ namespace view_servo
 {
 /** @file A rectangle of pixels as points [px]. Pixels' middles have whole coordinates, so it ends at width - 1. */
 
-/** Clockwise in the image, from the upper left one: the middles of the pixels in the corners. */
+/** The middles of the pixels in the four corners [px]: clockwise as seen in the image, the upper left one first. */
 inline std::array<Eigen::Vector2d, 4> cornersOf(const cv::Rect& region)
 {
   const double left = region.x;
@@ -22,12 +22,13 @@ inline std::array<Eigen::Vector2d, 4> cornersOf(const cv::Rect& region)
            Eigen::Vector2d(left, bottom) };
 }
 
-/** Those of a whole image. */
+/** The same for the rectangle of a whole image. */
 inline std::array<Eigen::Vector2d, 4> cornersOf(const cv::Size& size)
 {
   return cornersOf(cv::Rect(cv::Point(), size));
 }
 
+/** The middle of the rectangle [px]. */
 inline Eigen::Vector2d middleOf(const cv::Rect& region)
 {
   return { region.x + 0.5 * (region.width - 1), region.y + 0.5 * (region.height - 1) };

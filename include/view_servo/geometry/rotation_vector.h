@@ -7,7 +7,7 @@
 
 namespace view_servo
 {
-/** The rotation about a vector's direction by its length [rad]. */
+/** The rotation about the direction of `vector` by an angle of its length [rad]. */
 inline Eigen::Matrix3d rotationFromVector(const Eigen::Vector3d& vector)
 {
   const double angle = vector.norm();

@@ -10,9 +10,9 @@ namespace view_servo
 /** How strongly reference feature `row` is associated with current feature `column`. */
 struct Association
 {
-  int row;
-  int column;
-  double weight;
+  int row;        ///< index of the reference feature
+  int column;     ///< index of the current feature
+  double weight;  ///< > 0, in no unit; larger is stronger
 };
 
 /**

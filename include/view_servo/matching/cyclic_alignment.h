@@ -39,12 +39,14 @@ private:
   /** A rotation with its best weight, and where its path is kept. */
   struct Rotation
   {
-    int columns;
-    float weight;
-    std::size_t path;
+    int columns;       // by how many columns the second string is rotated
+    float weight;      // of its best alignment
+    std::size_t path;  // index into paths_
   };
 
+  /** Best weight of one rotation, whose path lies between two others (null: no limit); sets `path`. */
   float alignRotation(int rotation, const Path* left, const Path* right, Path& path);
+  /** Tries the rotations between two, and keeps the best weight in best_. */
   void divide(const Rotation& left, const Rotation& right);
 
   int rows_ = 0;

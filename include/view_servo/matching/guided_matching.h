@@ -17,7 +17,7 @@ namespace view_servo
 /** Options of the search for more matches that agree with a geometry. */
 struct GuidedParams
 {
-  int patch_radius = 6;          ///< patches of (2 r + 1)² pixels are compared [px]
+  int patch_radius = 6;          ///< r: patches of (2 r + 1)² pixels are compared [px]
   double min_correlation = 0.6;  ///< least correlation of the current patch with the warped reference patch
 
   /** Each fault in one line, those of nested parameters included; empty when the parameters are usable. */

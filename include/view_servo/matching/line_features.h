@@ -23,8 +23,8 @@ struct LineFeatureParams
 {
   LineGroupParams groups;
   int max_grouped = 400;     ///< at most this many segments, the longest, form groups and start regions
-  int neighbours = 40;       ///< nearest segments kept for each, see near(): regions of matches begin among them
-  int neighbour_pairs = 15;  ///< at most this many of these, whose lines meet its own, are kept, see meetings()
+  int neighbours = 40;       ///< number of nearest segments that are kept for each grouped one, see near()
+  int neighbour_pairs = 15;  ///< most segments kept for each whose lines meet its own, the nearest, see meetings()
 
   /** Each fault in one line, those of nested parameters included; empty when the parameters are usable. */
   std::vector<std::string> validate() const;
@@ -50,7 +50,8 @@ public:
     Eigen::Vector2d at = Eigen::Vector2d::Zero();  ///< intersection of the two lines [px]
   };
 
-  static constexpr double MIN_SINE = 0.198669331;  ///< of the least angle between lines that count as meeting, 0.2 rad
+  /** Sine of the least angle between lines that count as meeting, 0.2 rad. */
+  static constexpr double MIN_SINE = 0.198669331;
 
   /**
    * @param grey 8-bit, one channel.
@@ -83,7 +84,7 @@ public:
   {
     return input_[static_cast<std::size_t>(i)];
   }
-  /** The image, smoothed by a Gaussian of 1.5 px. */
+  /** The image, 8-bit, smoothed by a Gaussian with a standard deviation of 1.5 px. */
   const cv::Mat& smoothed() const
   {
     return smoothed_;
@@ -93,7 +94,10 @@ public:
   {
     return near_[static_cast<std::size_t>(i)];
   }
-  /** The nearest segments whose lines meet that of a grouped segment within max_distance of both, nearest first. */
+  /**
+   * The nearest segments whose lines meet that of a grouped segment within params.groups.max_distance of both segments,
+   * nearest first.
+   */
   const std::vector<Meeting>& meetings(int i) const
   {
     return meetings_[static_cast<std::size_t>(i)];

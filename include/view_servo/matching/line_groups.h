@@ -22,9 +22,10 @@ namespace view_servo
  * and never does for coplanar segments in front of the camera.
  */
 
+/** How many segments form a group. */
 enum class LineGrouping
 {
-  PAIRS,
+  PAIRS,    ///< two segments
   TRIPLETS  ///< two pairs that share a segment
 };
 
@@ -40,7 +41,7 @@ struct LineGroupParams
 {
   LineGrouping groups = LineGrouping::TRIPLETS;  ///< how many segments a group has
   LineOrder order = LineOrder::CONTRAST;         ///< how the ends of a segment are told apart
-  double max_distance = 100.0;  ///< of each segment of a pair from the intersection of their lines [px]
+  double max_distance = 100.0;  ///< largest distance of each segment of a pair from where their lines meet [px]
   double collinearity = 2.0;    ///< a point this close to a segment's line counts as on it [px]
   double min_angle_deg = 15.0;  ///< least angle between the lines of the two segments of a pair [deg]
   int max_neighbours = 15;      ///< most pairs that a segment forms, the closest ones; 0 = no limit
@@ -87,11 +88,12 @@ struct LineGroup
 {
   std::uint32_t key;            ///< equal keys: same structure; see tripletKey()
   float weight;                 ///< probability of the structure, (0, 1]
-  std::array<int, 3> segments;  ///< their indices; in two groups, segments at the same place correspond
+  std::array<int, 3> segments;  ///< their indices; in groups of equal key, segments at the same place correspond
 };
 
 /**
- * Key of a triplet: ((p1 * 81 + p2) * 81 + p3) * classes + c. The thesis' eq. 4.3 adds the class c to the last index,
+ * Key of a triplet: ((p1 * 81 + p2) * 81 + p3) * classes + c, with the indices p1 to p3 of its three pairs, as pairIndex()
+ * gives them, and its class c in [0, classes). The thesis' eq. 4.3 adds the class c to the last index,
  * which lets keys collide.
  */
 std::uint32_t tripletKey(int p1, int p2, int p3, int c, int classes);
@@ -122,8 +124,8 @@ private:
 };
 
 /**
- * Votes (thesis 4.4): each group of the current image gives (w_i + w) / n to the association of every segment with its
- * counterpart in each of the n reference groups with the same key.
+ * Votes (thesis 4.4): each group of the current image, of weight w, gives (w_i + w) / n to the association of every
+ * segment with its counterpart in each of the n reference groups with the same key, of weights w_i.
  */
 AssociationMatrix associateLines(const LineIndex& reference, const LineIndex& current);
 

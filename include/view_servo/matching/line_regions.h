@@ -28,12 +28,12 @@ struct LineRegionParams
   int max_trials = 600;               ///< candidates tried in all, beginning with those that stand out most
   int max_companions = 12;            ///< matches of neighbours tried with a candidate, those of most votes
   int max_hypotheses = 3;             ///< affine maps scored for a candidate, those whose three segments agree best
-  double affine_tolerance = 3.0;      ///< distance across of segments that agree with a local affine map [px]
-  double tolerance = 2.0;             ///< distance across of segments that agree with a homography [px]
+  double affine_tolerance = 3.0;      ///< largest distance across of segments that agree with a local affine map [px]
+  double tolerance = 2.0;             ///< largest distance across of segments that agree with a homography [px]
   double max_angle_deg = 10.0;        ///< largest angle between a mapped segment and its counterpart [deg]
-  double min_support = 5.0;           ///< least sum over a region's matches of 0.3 + 0.7 share
+  double min_support = 5.0;           ///< least sum of 0.3 + 0.7 SegmentMatch::share over a region's matches
   double min_correlation = 0.55;      ///< least sideCorrelation() of a match
-  double min_mean_correlation = 0.6;  ///< least mean of a region's matches
+  double min_mean_correlation = 0.6;  ///< least mean sideCorrelation() of a region's matches
 
   /** Each fault in one line, those of nested parameters included; empty when the parameters are usable. */
   std::vector<std::string> validate() const;
@@ -76,17 +76,18 @@ std::optional<LineRegion> growLineRegion(const LineFeatures& reference, const Li
                                          const Eigen::Matrix3d& h, const std::vector<SegmentMatch>& matches,
                                          const LineRegionParams& params);
 
-constexpr std::size_t LINE_DIRECTIONS = 4;  ///< of the current image, 45 degrees apart, beginning with that of its rows
+/** Number of directions in the current image that evidenceOf() tells apart: 45 degrees apart, that of the rows first. */
+constexpr std::size_t LINE_DIRECTIONS = 4;
 
-/** How many segments that lie across one direction are found where a homography sends them, and how many beside. */
+/** Of the segments that lie across one direction: how many are found where a homography sends them, how many beside. */
 struct LineEvidence
 {
   std::size_t seen = 0;    ///< segments sent into the current image
   std::size_t found = 0;   ///< of these, those for which a segment is there that looks alike
-  std::size_t tried = 0;   ///< segments sent a little aside, which is done in several ways
+  std::size_t tried = 0;   ///< trials of sending a segment a little aside, several for each
   std::size_t beside = 0;  ///< of these, those for which a segment is there that looks alike
 
-  /** Of a segment to be found where it does not belong, as the rule of succession estimates it. */
+  /** Probability that a segment is found where it does not belong, as the rule of succession estimates it, (0, 1). */
   double chance() const
   {
     return (static_cast<double>(beside) + 1.0) / (static_cast<double>(tried) + 2.0);

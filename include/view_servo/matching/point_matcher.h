@@ -17,6 +17,7 @@
 
 namespace view_servo
 {
+/** How one-to-one candidates are taken from an association. */
 enum class AssignmentMethod
 {
   EXACT,  ///< maximumWeightMatching()
@@ -31,7 +32,7 @@ struct PointMatcherParams
   ProfileSearchParams search;
   AssignmentMethod assignment = AssignmentMethod::EXACT;
   bool cyclic_order = true;      ///< weigh associations by cyclic alignment of the profiles that voted (ch. 7)
-  double min_correlation = 0.7;  ///< least correlation of profiles that are aligned (7.3)
+  double min_correlation = 0.7;  ///< least correlation of two profiles' features for them to be aligned (7.3)
   /** At most this many entries of each row and of each column are aligned, those of most votes; 0 = all. */
   int cyclic_entries = 5;
 
@@ -50,7 +51,7 @@ struct ProfileEnds
    * angle, in 2^14 steps a quadrant), the lower half the corner at the other end: so that all at a corner differ.
    */
   std::uint32_t from_start;
-  std::uint32_t from_end;  ///< the same where it ends
+  std::uint32_t from_end;  ///< the same among the profiles at its end, with its start as the corner at the other end
   float inverse_length;    ///< 1 / length of the vector of its features; 0 where that is 0
 
   /** Index of the corner where it starts. */
@@ -70,7 +71,7 @@ struct PointFeatures
 {
   std::vector<Corner> corners;
   ProfileSet profiles;
-  std::vector<ProfileEnds> ends;  ///< of each profile
+  std::vector<ProfileEnds> ends;  ///< one for each profile
 };
 
 /**

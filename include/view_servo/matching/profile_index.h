@@ -18,15 +18,16 @@ enum class ProfileSearch
 {
   NEAREST,  ///< its K_v nearest
   RADIUS,   ///< all within D_v
-  LEAF  ///< those of the tree's leaf where it belongs, twelve at most: many are among its nearest, and none is sought
+  LEAF      ///< those in the leaf of the tree where it belongs, twelve at most: many of its nearest, without a search
 };
 
+/** Options of the search for similar profiles. */
 struct ProfileSearchParams
 {
   ProfileSearch search = ProfileSearch::NEAREST;
   int neighbours = 12;   ///< K_v (NEAREST): number of profiles each votes for; 25 find 2 % more, in 1.6 times the time
-  double radius = 0.5;   ///< D_v (RADIUS): distance of similar profiles [standard deviations of a feature]
-  double epsilon = 2.0;  ///< a neighbour found is at most (1 + epsilon) times farther than the true one (NEAREST)
+  double radius = 0.5;   ///< D_v (RADIUS): largest distance of similar profiles [standard deviations of a feature]
+  double epsilon = 2.0;  ///< a neighbour found is at most 1 + epsilon times as far as the true one (NEAREST); 0: exact
   double share = 1.0;    ///< part of the current profiles that vote: those whose feature vectors are longest
 
   /** Each fault in one line, those of nested parameters included; empty when the parameters are usable. */
@@ -47,10 +48,11 @@ struct ProfileMatch
 class SimilarProfiles
 {
 public:
+  /** Some matches; refers to the SimilarProfiles that returned it. */
   struct Range
   {
     const ProfileMatch* first;
-    const ProfileMatch* last;
+    const ProfileMatch* last;  ///< one behind the last match
 
     const ProfileMatch* begin() const
     {
@@ -85,10 +87,12 @@ public:
   {
     return begin_.size() - 1;
   }
+  /** Whether there are no current profiles. */
   bool empty() const
   {
     return size() == 0;
   }
+  /** Those similar to the current profile of that index; empty where there are none. */
   Range operator[](std::size_t profile) const
   {
     return { matches_.data() + begin_[profile], matches_.data() + begin_[profile + 1] };

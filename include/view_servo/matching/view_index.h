@@ -18,10 +18,11 @@ namespace view_servo
 /** Options of a ViewIndex. */
 struct ViewIndexParams
 {
-  int leaf_words = 64;       ///< more words in one leaf are divided among `branches` new ones
-  int branches = 4;          ///< children of a node
-  int checked_words = 1000;  ///< stored words that each word of a query is compared with, where there are so many
-  int max_distance = 64;     ///< bits in which words of one patch differ at most
+  int leaf_words = 64;  ///< a leaf with more words is divided into `branches` new ones
+  int branches = 4;     ///< number of children of a node
+  int checked_words =
+      1000;               ///< number of stored words that each word of a query is compared with, if there are so many
+  int max_distance = 64;  ///< largest hammingDistance() of words that count as similar [bits]
 
   /** Each fault in one line; empty when the parameters are usable. */
   std::vector<std::string> validate() const;
@@ -68,8 +69,9 @@ public:
   /** The most likely views, best first, `most` at most; equal scores by name. Views without a similar word are left out. */
   std::vector<ScoredView> query(const std::vector<BinaryFeature>& features, std::size_t most) const;
 
+  /** Whether there is a view of this name. */
   bool contains(const std::string& name) const;
-  std::vector<std::string> names() const;  ///< sorted
+  std::vector<std::string> names() const;  ///< names of all views, sorted
   std::size_t size() const;                ///< number of views
 
   /** Bytes of memory that the words and the tree take. */
@@ -92,22 +94,22 @@ private:
   struct Entry
   {
     BinaryWord word;
-    std::uint32_t view;
-    std::uint8_t angle;
+    std::uint32_t view;                    ///< index into views_
+    std::uint8_t angle;                    ///< BinaryFeature::angle
     std::array<std::uint8_t, 3> unused{};  // files hold entries as they are in memory
   };
   struct Node
   {
-    BinaryWord centre{};
-    std::uint32_t first_child = 0;  ///< the children lie side by side; 0: this is a leaf
-    std::uint32_t children = 0;
-    std::uint32_t limit = 0;     ///< words of a leaf above which it is divided
-    std::vector<Entry> entries;  ///< of a leaf
+    BinaryWord centre{};            ///< the word that those below this node resemble
+    std::uint32_t first_child = 0;  ///< index into nodes_, where the children lie side by side; 0: this is a leaf
+    std::uint32_t children = 0;     ///< number of children
+    std::uint32_t limit = 0;        ///< number of words above which a leaf is divided
+    std::vector<Entry> entries;     ///< words of a leaf
   };
   struct View
   {
-    std::string name;            ///< empty: free
-    std::uint32_t features = 0;  ///< that were added
+    std::string name;            ///< empty: this place is free
+    std::uint32_t features = 0;  ///< number of its features
   };
   class Search;
 
@@ -120,8 +122,8 @@ private:
   ViewIndexParams params_;
   std::vector<Node> nodes_;
   std::vector<View> views_;
-  std::vector<std::uint32_t> free_;
-  std::map<std::string, std::uint32_t> slots_;
+  std::vector<std::uint32_t> free_;             // indices of free places in views_
+  std::map<std::string, std::uint32_t> slots_;  // index into views_ by name
 };
 
 }  // namespace view_servo

@@ -13,6 +13,7 @@ namespace view_servo
 class Faults
 {
 public:
+  /** Adds `fault`, one line, unless `condition` holds. */
   void require(bool condition, std::string fault)
   {
     if (!condition)
@@ -20,10 +21,12 @@ public:
       list_.push_back(std::move(fault));
     }
   }
+  /** Adds faults that were found elsewhere. */
   void add(const std::vector<std::string>& faults)
   {
     list_.insert(list_.end(), faults.begin(), faults.end());
   }
+  /** All faults added so far, in their order. */
   const std::vector<std::string>& list() const
   {
     return list_;

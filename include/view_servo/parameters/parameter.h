@@ -18,7 +18,7 @@ namespace view_servo
  */
 struct Parameter
 {
-  std::string name;
+  std::string name;  ///< as yaml files and the parameter server have it
   std::string type;  ///< "int", "double", "bool", "string" or the allowed words, joined by '|'
   std::string unit;  ///< such as "px" or "rad/s"; empty: none
   /**
@@ -40,11 +40,13 @@ struct Parameter
  * Rows of such tables, bound to `value`, which must outlive them. Texts are parsed alike whatever the locale.
  */
 Parameter integer(std::string name, int& value, std::string unit, std::string range, std::string description);
-/** Finite numbers only. */
+/** A "double", of which only finite numbers are allowed. */
 Parameter real(std::string name, double& value, std::string unit, std::string range, std::string description);
+/** An "int" that is not negative, such as a seed. */
 Parameter natural(std::string name, std::uint64_t& value, std::string description);
 Parameter boolean(std::string name, bool& value, std::string description);
 Parameter text(std::string name, std::string& value, std::string description);
+/** A "string" that names a file or directory. */
 Parameter path(std::string name, std::filesystem::path& value, std::string description);
 
 /** A choice among words; booleans are the words true and false. */

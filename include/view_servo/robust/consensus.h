@@ -14,12 +14,12 @@ public:
   virtual ~Consensus() = default;
 
   /**
-   * The smaller the better. May return infinity as soon as it is certain, or nearly so, that the cost is not below
-   * `limit`.
+   * Cost of a model, the smaller the better. May return infinity as soon as it is certain, or nearly certain, that the cost
+   * is not below `limit`; with a limit of infinity the cost is exact.
    */
   virtual double cost(const Model& model, double limit) = 0;
 
-  /** Sets `inliers` to the data that support a model, ascending, with the inlier threshold multiplied by `width`. */
+  /** Sets `inliers` to the indices of the data that support a model, ascending, with the inlier threshold multiplied by `width`. */
   virtual void findInliers(const Model& model, double width, std::vector<int>& inliers) = 0;
 
   /** Called with the inliers of each new best sample, by which later models can be rejected sooner. */
@@ -27,7 +27,7 @@ public:
   {
   }
 
-  /** The cost in a result without a model. */
+  /** RansacResult::cost where no model was found. */
   virtual double costOfNone() const = 0;
 };
 

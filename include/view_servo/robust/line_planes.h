@@ -19,6 +19,7 @@ namespace view_servo
  * Planes on which matched line segments lie, and the fundamental matrix of such a scene (thesis 4.7).
  */
 
+/** Options of the search for planes. */
 struct LinePlaneParams
 {
   double threshold = 2.0;  ///< largest distance of a plane's lines, across, in either image [px]
@@ -41,7 +42,7 @@ struct LinePlanes
 
 /**
  * One plane after the other, each by RANSAC among the lines that lie on none of those before (thesis 4.7.1).
- * @param ransac_params of each plane; threshold and sampling are set here, and at most 500 iterations are made.
+ * @param ransac_params for each plane; its threshold and sampling are replaced, and at most 500 iterations are made.
  */
 LinePlanes findPlanes(const SegmentPairs& lines, const LinePlaneParams& params, const RansacParams& ransac_params,
                       Rng& rng);

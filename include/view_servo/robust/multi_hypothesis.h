@@ -20,6 +20,7 @@ namespace view_servo
  * best one-to-one matching among those entries of the association matrix that agree with the model.
  */
 
+/** Where samples come from. */
 enum class HypothesisSampling
 {
   CANDIDATES,  ///< from the maximum-weight matching of the association: the modified algorithm (9.5.1)
@@ -40,11 +41,12 @@ struct MultiHypothesisParams
 /** Names, units and ranges of these parameters, by which validate() checks them. */
 std::vector<Parameter> parameters(MultiHypothesisParams& params);
 
+/** The model found, with its one-to-one matches. */
 template <typename Model>
 struct MultiHypothesisResult
 {
   std::optional<Model> model;        ///< empty: no sample gave one
-  std::vector<Association> matches;  ///< one-to-one, all agree with the model, in the order of rows
+  std::vector<Association> matches;  ///< one-to-one matches that agree with the model, in the order of rows
   RansacStatistics statistics;
 };
 

@@ -24,8 +24,8 @@ public:
    * @param plane homography, x_cur ~ H x_ref [px].
    * @param pairs matches of all kinds, the most trustworthy first: the fewer wrong ones are before the right ones, the
    * more the right ones mean.
-   * @param threshold a Sampson distance [px]: a pair agrees with an F that is nearer; one that lies nearer than twice as
-   * far to where the plane says is on the plane.
+   * @param threshold [px]: a pair agrees with an F when its Sampson distance is below this, and counts as on the plane when
+   * its current point is nearer than twice this to where the plane's homography sends the reference point.
    */
   Parallax(const Eigen::Matrix3d& plane, const Correspondences& pairs, double threshold);
 
@@ -35,14 +35,17 @@ public:
    */
   double significance(const Eigen::Matrix3d& f) const;
 
-  /** Of the matrices [e]x H with an epipole from two pairs off the plane, the most significant of `samples` drawn. */
+  /**
+   * Draws `samples` matrices [e]x H, each with the epipole e of two pairs off the plane, and returns the most significant
+   * one; empty when too few pairs lie off the plane.
+   */
   std::optional<Eigen::Matrix3d> findFundamental(int samples, Rng& rng) const;
 
 private:
   struct Pair
   {
     Correspondence pair;
-    double chance;  ///< that a random direction of its parallax agrees
+    double chance;  ///< probability that a random direction of its parallax agrees with an epipole
   };
 
   Eigen::Matrix3d plane_;

@@ -13,8 +13,8 @@ namespace view_servo
 /** A motion on the floor, with the matrices by which every datum is scored. */
 struct PlanarMotion
 {
-  PlanarPose pose;              ///< of the reference camera in the current one, of distance 1
-  Eigen::Matrix3d rotation;     ///< X_cur = R X_ref + t
+  PlanarPose pose;              ///< pose of the reference camera in the current one, scaled to distance 1
+  Eigen::Matrix3d rotation;     ///< R of X_cur = R X_ref + t
   Eigen::Vector3d translation;  ///< t of the same equation, of length 1
   Eigen::Matrix3d essential;    ///< x_curᵀ E x_ref = 0
 
@@ -70,7 +70,8 @@ public:
   using Model = PlanarPose;
   static constexpr int SAMPLE_SIZE = 2;
 
-  /** Keeps a reference to `sightings`, which must outlive the estimator. @param width inlier threshold. */
+  /** Keeps a reference to `sightings`, which must outlive the estimator. @param width inlier threshold, in units
+   * of the level points. */
   PlanarPoseEstimator(const std::vector<Sighting>& sightings, double width) : sightings_(sightings), width_(width)
   {
   }

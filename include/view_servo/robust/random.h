@@ -16,10 +16,10 @@ using Rng = std::mt19937_64;
 /** Uniform integer in [0, count), count > 0. */
 std::size_t uniformIndex(Rng& rng, std::size_t count);
 
-/** Uniform in [low, high). */
+/** Uniform real number in [low, high). */
 double uniform(Rng& rng, double low, double high);
 
-/** Standard normal (Box & Muller 1958). */
+/** Normally distributed, mean 0, variance 1 (Box & Muller 1958). */
 double gaussian(Rng& rng);
 
 }  // namespace view_servo

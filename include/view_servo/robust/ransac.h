@@ -17,7 +17,7 @@ namespace view_servo
 struct RansacParams
 {
   double inlier_threshold = 3.0;   ///< largest error of an inlier [px]
-  double confidence = 0.999;       ///< wanted probability that an outlier-free sample was drawn
+  double confidence = 0.999;       ///< probability to be reached that some sample drawn is free of outliers, (0, 1)
   int min_iterations = 100;        ///< samples solved before the adaptive stop (thesis eq. 9.5) may end the search
   int max_iterations = 2000;       ///< random samples solved at most
   int max_rejected = 50000;        ///< samples that Estimator::accepts() may refuse in all; one more ends the search
@@ -32,12 +32,13 @@ struct RansacParams
 /** Names, units and ranges of these parameters, by which validate() checks them. */
 std::vector<Parameter> parameters(RansacParams& params);
 
+/** Why a search ended. */
 enum class RansacStop
 {
-  CONFIDENCE_REACHED,
-  ITERATION_LIMIT,
-  REJECTION_LIMIT,
-  TOO_FEW_DATA
+  CONFIDENCE_REACHED,  ///< so many samples were drawn that one without outliers is likely enough
+  ITERATION_LIMIT,     ///< max_iterations
+  REJECTION_LIMIT,     ///< max_rejected
+  TOO_FEW_DATA         ///< no sample can be drawn from so few
 };
 
 struct RansacStatistics
@@ -47,7 +48,7 @@ struct RansacStatistics
   int models = 0;                              ///< models scored
   int local_optimizations = 0;                 ///< refits that improved the best model
   RansacStop stop = RansacStop::TOO_FEW_DATA;  ///< why the search ended
-  double elapsed_ms = 0.0;                     ///< [ms]
+  double elapsed_ms = 0.0;                     ///< time of the whole search [ms]
 };
 
 template <typename Model>

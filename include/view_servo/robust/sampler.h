@@ -29,6 +29,7 @@ public:
   virtual bool replace(Rng& rng, int trial, std::size_t position, std::vector<int>& sample) const = 0;
 };
 
+/** How samples are drawn from a list of data. */
 enum class Sampling
 {
   UNIFORM,     ///< every datum equally likely
@@ -57,13 +58,13 @@ public:
   bool replace(Rng& rng, int trial, std::size_t position, std::vector<int>& sample) const override;
 
 private:
-  std::vector<int> data_;
-  std::vector<int> sorted_;
-  std::size_t size_;
-  std::size_t prefix_;      ///< n: samples come from the best n data
-  double prefix_samples_;   ///< T_n: samples expected from within the best n, real-valued
-  double samples_drawn_;    ///< t
-  double samples_to_grow_;  ///< T'_n: n grows when t passes it
+  std::vector<int> data_;    ///< in the order given
+  std::vector<int> sorted_;  ///< the same, ascending
+  std::size_t size_;         ///< number of data in a sample
+  std::size_t prefix_;       ///< n: samples come from the best n data
+  double prefix_samples_;    ///< T_n: samples expected from within the best n, real-valued
+  double samples_drawn_;     ///< t: samples drawn so far
+  double samples_to_grow_;   ///< T'_n: n grows when t passes it
 };
 
 /**
@@ -88,12 +89,13 @@ public:
   bool replace(Rng& rng, int trial, std::size_t position, std::vector<int>& sample) const override;
 
 private:
+  /** Index of an entry, drawn with a probability proportional to its weight. */
   int drawEntry(Rng& rng) const;
   /** Whether an entry shares a row or column with an entry of the sample, the one at `except` left aside. */
   bool collides(int entry, const std::vector<int>& sample, std::size_t except) const;
 
   const AssociationMatrix& association_;
-  std::size_t size_;
+  std::size_t size_;  ///< number of entries in a sample
   int replacements_;
   std::vector<double> cumulated_;  ///< sums of the weights from the first entry to each one
 };

@@ -19,11 +19,12 @@ namespace view_servo
  */
 double viewConstraint(const std::array<Correspondence, 5>& five);
 
+/** Options of viewConsistentCandidates(). */
 struct ViewConsistencyParams
 {
   double threshold = 0.03;         ///< a group of five is consistent below this violation
-  double mean_increments = 100.0;  ///< groups are drawn until the candidates were counted this often on average
-  int max_groups = 200000;         ///< groups drawn at most
+  double mean_increments = 100.0;  ///< groups are drawn until a candidate was counted this often, on average over all
+  int max_groups = 200000;         ///< largest number of groups that are drawn
 
   /** Each fault in one line, those of nested parameters included; empty when the parameters are usable. */
   std::vector<std::string> validate() const;

@@ -30,7 +30,7 @@ namespace view_servo
 ServoTarget servoTargetOf(const StoredView& view, const Camera& camera);
 
 /**
- * A valid homography as servoing takes it. @throws std::runtime_error naming a number outside the range in
+ * A valid homography as servoing takes it. @throws std::runtime_error naming a number that leaves the range stated in
  * Homography.msg.
  */
 PlaneView toPlaneView(const Homography& message);

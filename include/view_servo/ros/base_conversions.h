@@ -27,6 +27,7 @@ namespace view_servo
 /** The base's pose on the floor in the odometry frame; not finite where the message is not. */
 PlanarPose toPlanarPose(const nav_msgs::Odometry& message);
 
+/** A velocity in base_link as a message in the frame `base_frame`. */
 geometry_msgs::TwistStamped toTwistStamped(const BaseVelocity& velocity, const ros::Time& stamp,
                                            const std::string& base_frame);
 
@@ -36,9 +37,10 @@ geometry_msgs::TwistStamped toTwistStamped(const BaseVelocity& velocity, const r
  */
 HeadingEvidence toHeadingEvidence(const std::vector<PointMatch>& matches);
 
+/** The report as a message, stamped with its last image, with angles in `base_frame`. */
 Heading toHeading(const HomingReport& report, const std::string& base_frame);
 
-/** Where the base has to be. The report must have a goal_in_odom. */
+/** The base's pose at the view, with its covariance, in `odom_frame`. The report must have a goal_in_odom. */
 geometry_msgs::PoseWithCovarianceStamped toViewPose(const HomingReport& report, const std::string& odom_frame);
 
 /** The direction to the view for rviz: a pose at the base with its x axis towards the view. */

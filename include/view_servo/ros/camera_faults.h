@@ -18,8 +18,8 @@ namespace view_servo
 /** Names of a camera's topics as other nodes see them. */
 struct CameraTopics
 {
-  std::string image;
-  std::string info;
+  std::string image;  ///< topic of the images
+  std::string info;   ///< topic of camera_info
 
   /** Both in quotation marks, for messages. */
   std::string both() const
@@ -33,18 +33,18 @@ struct CameraTraffic
 {
   int images = 0;         ///< messages on the topic of images
   int infos = 0;          ///< messages on the topic of camera_info
-  int pairs = 0;          ///< of an image and a camera_info with the same stamp
-  double duration = 0.0;  ///< of the time in which they came [s]
+  int pairs = 0;          ///< pairs of an image and a camera_info with the same stamp
+  double duration = 0.0;  ///< length of the time in which they came [s]
 };
 
-/** By the messages that came or did not come; nothing is wrong when none came at all. */
+/** What is wrong with the numbers of messages that came; nothing when none came at all. */
 std::string faultOf(const CameraTraffic& traffic, const CameraTopics& topics);
 
-/** By what is in an image and the camera_info of the same stamp: calibration and sizes. */
+/** What is wrong with an image and the camera_info of the same stamp: with calibration or sizes. */
 std::string faultOf(const CameraImage& image, const sensor_msgs::CameraInfo& info, const CameraTopics& topics);
 
 /**
- * By an image's stamp. One from the future is as bad as an old one: time jumped back, as when a bag loops.
+ * What is wrong with an image's age. One from the future is as bad as an old one: time jumped back, as when a bag loops.
  * @param topic of the image. @param max_age as `~max_image_age` [s].
  */
 std::string faultOfAge(const ros::Time& stamp, const std::string& topic, double max_age);

@@ -22,16 +22,17 @@ namespace view_servo
 struct CameraImage
 {
   CameraImage() = default;  // message_filters needs it
+  /** @param from topic that the image came on. */
   CameraImage(const sensor_msgs::ImageConstPtr& image, const std::string& from);
   CameraImage(const sensor_msgs::CompressedImageConstPtr& image, const std::string& from);
 
-  std_msgs::Header header;
-  std::uint32_t width = 0;                      ///< [px]; of a compressed image by the header of its data
-  std::uint32_t height = 0;                     ///< [px]
-  std::string encoding;                         ///< of a compressed image its format
-  std::string topic;                            ///< that it came on, which errors name
-  std::string fault;                            ///< why nothing can be decoded, by the header of the data; or empty
-  sensor_msgs::ImageConstPtr raw;               ///< null when it came compressed
+  std_msgs::Header header;         ///< of the message: its stamp, and the camera's optical frame
+  std::uint32_t width = 0;         ///< [px]; of a compressed image by the header of its data
+  std::uint32_t height = 0;        ///< [px]
+  std::string encoding;            ///< the message's encoding; of a compressed image its format
+  std::string topic;               ///< topic that it came on, which errors name
+  std::string fault;               ///< why a compressed image cannot be decoded, as far as is known; or empty
+  sensor_msgs::ImageConstPtr raw;  ///< null when it came compressed
   sensor_msgs::CompressedImageConstPtr packed;  ///< null when it came raw
 };
 

@@ -77,8 +77,8 @@ public:
 
   /**
    * Waits for latest(), as a camera may start later than its node. The wait is by a steady clock, and logged. Only one
-   * caller waits at a time; for others this is latest(). For a caller that waits blocks one of the spinner's few
-   * threads, which also deliver the images.
+   * caller waits at a time, and others get what latest() gives at once: each one that waits blocks one of the spinner's
+   * few threads, which also deliver the images.
    * @param patience longest wait [s].
    */
   CameraFrame latest(double patience) const;
@@ -89,6 +89,7 @@ public:
     return image_subscriber_.getTopic();
   }
 
+  /** Fills in a part of `/diagnostics`: whether usable frames come, at which rate, and problem(). */
   void diagnose(diagnostic_updater::DiagnosticStatusWrapper& status);
 
 private:

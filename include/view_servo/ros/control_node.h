@@ -28,12 +28,15 @@ public:
   {
   }
 
+  /** Opens or closes the gate, and says so in the response. */
   std_srvs::SetBool::Response set(bool enabled);
+  /** Whether `~enable` was last called with true. */
 
   bool enabled() const
   {
     return enabled_;
   }
+  /** As given to the constructor. */
   bool dryRun() const
   {
     return dry_run_;
@@ -56,6 +59,7 @@ public:
   explicit StatusOutput(ros::NodeHandle& nh);
 
   void publish(ServoStatus status);
+  /** The status published last. */
 
   const ServoStatus& last() const
   {
@@ -95,8 +99,8 @@ public:
   }
 
 private:
-  int count_ = 0;
-  bool ever_ = false;
+  int count_ = 0;      // zeros sent in a row
+  bool ever_ = false;  // a command was sent
 };
 
 namespace detail
@@ -106,6 +110,7 @@ namespace detail
  * can stop its robot before ROS ends.
  */
 void deferShutdown();
+/** Whether one of these has come since deferShutdown(). */
 bool shutdownRequested();
 }  // namespace detail
 

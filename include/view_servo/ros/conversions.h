@@ -59,8 +59,8 @@ sensor_msgs::CameraInfo toCameraInfo(const Camera& camera, const std_msgs::Heade
 cv::Mat toGrey(const sensor_msgs::Image& image, const std::string& name);
 /**
  * A JPEG or PNG image, or another format of decodeImage(), as 8-bit grey.
- * @param name as above. @throws ImageError, with format and number of bytes, when it is damaged, is not such an image, is
- * of depths, or has a size beyond the limits, which is found before it is decoded.
+ * @param name as above. @throws ImageError, with format and number of bytes, when it is damaged, is not such an image,
+ * holds depths (compressedDepth), or has a size beyond the limits, which is found before it is decoded.
  */
 cv::Mat toGrey(const sensor_msgs::CompressedImage& image, const std::string& name);
 
@@ -74,13 +74,14 @@ cv::Size sizeOf(const sensor_msgs::CompressedImage& image, const std::string& na
  */
 std::string decodedEncoding(const std::string& format, int type);
 
+/** The image as a message. @param encoding one of sensor_msgs::image_encodings, which must fit the image's type. */
 sensor_msgs::Image toImage(const cv::Mat& image, const std::string& encoding, const std_msgs::Header& header);
 
 /** Width and height 0 stand for the whole image, as an empty rectangle. @throws ImageError when it leaves the image. */
 cv::Rect toRect(const sensor_msgs::RegionOfInterest& roi, const cv::Size& image);
 sensor_msgs::RegionOfInterest toRegionOfInterest(const cv::Rect& rect);
 
-/** The transform tf gives for target = ViewPose::frame, source = the view's frame. */
+/** The pose in a transform that tf gives from the view's frame (source) to ViewPose::frame (target). */
 ViewPose toViewPose(const geometry_msgs::TransformStamped& transform);
 geometry_msgs::PoseStamped toPoseStamped(const ViewPose& pose, const ros::Time& stamp);
 
@@ -88,7 +89,7 @@ std::vector<PointMatch> toPointMatches(const std::vector<MatchedPoint>& matches)
 LineSegment toLineSegment(const Segment& segment);
 std::vector<LineMatch> toLineMatches(const std::vector<MatchedLine>& lines);
 
-/** Writes a matrix row by row; arrays in messages are boost::array in some ROS releases and std::array in others. */
+/** Writes a matrix row by row into an array of nine numbers; arrays in messages are boost::array in some ROS releases and std::array in others. */
 template <typename Array>
 void copyRowMajor(const Eigen::Matrix3d& matrix, Array& array)
 {

@@ -58,7 +58,7 @@ public:
   }
   enum class Stamp
   {
-    NEWEST,
+    NEWEST,   ///< newer than all before
     LATE,     ///< a newer one has come before
     UNUSABLE  ///< zero, too old, far in the future, the same as before, or far behind: reject() was called
   };
@@ -89,19 +89,25 @@ public:
     needed_ = needed;
   }
 
-  /** Sets how many periods of the input's rate may pass without one, where this is longer than the timeout: at most 0.5 s each. */
+  /**
+   * Makes the timeout longer for an input that comes slowly: to this many of its usual periods, where that is more than the
+   * timeout; periods above 0.5 s count as 0.5 s.
+   */
   void followPace(double periods)
   {
     periods_ = periods;
   }
 
-  /** Time without input after which it is missing; that of followPace() only while nothing is wrong with what comes [s]. */
+  /** Time without input after which it is missing [s]. followPace() lengthens it only while problem() is empty. */
   double timeout() const
   {
     return problem_.empty() ? std::max(watch_.timeout(), periods_ * period_) : watch_.timeout();
   }
 
-  /** Sets by how much stamps may differ from ROS' time, in the past or in the future [s]; without a call 600 s ahead. */
+  /**
+   * Sets by how much stamps may differ from ROS' time, in the past or in the future [s]. Without a call they may be as old
+   * as they like, and up to 600 s in the future.
+   */
   void setMaxAge(double age)
   {
     max_age_ = age;
@@ -115,10 +121,12 @@ public:
   {
     return watch_.age();
   }
+  /** What comes, in words, as given to the constructor. */
   const std::string& what() const
   {
     return what_;
   }
+  /** The topics that it comes on, as given to the constructor. */
   const std::string& topics() const
   {
     return topics_;
@@ -136,11 +144,11 @@ private:
   std::string problem_;
   std::string jump_;
   StampOrder order_;
-  double max_age_ = std::numeric_limits<double>::infinity();
-  double periods_ = 0.0;
-  double period_ = 0.0;  // between inputs, in the mean of late [s]
-  bool came_ = false;
-  bool needed_ = true;
+  double max_age_ = std::numeric_limits<double>::infinity();  // see setMaxAge() [s]; infinity: it was not called
+  double periods_ = 0.0;                                      // see followPace()
+  double period_ = 0.0;                                       // mean time between the last inputs [s]
+  bool came_ = false;                                         // accept() was called
+  bool needed_ = true;                                        // see setNeeded()
 };
 
 /**
@@ -180,7 +188,7 @@ public:
     return diagnostics_;
   }
 
-  /** Where commands go. */
+  /** Name of the topic that commands go to, before remapping: cmd_vel, or cmd_vel_dry in a dry run. */
   std::string commandTopic() const
   {
     return gate_.dryRun() ? "cmd_vel_dry" : "cmd_vel";
@@ -205,7 +213,7 @@ public:
 
   /**
    * Runs `body` with the mutex held. If it throws, the goal ends: the robot stops, and the reason is published.
-   * @param what `body` works on, for that reason.
+   * @param what is worked on by `body`, in words, for that reason.
    */
   template <typename Body>
   void runLocked(const std::string& what, const Body& body)
@@ -268,7 +276,7 @@ protected:
   CommandGate gate_;
   mutable std::mutex mutex_;
   double start_patience_ = START_PATIENCE;  ///< longest wait of waitFor() [s]
-  std::string waiting_for_;                 ///< what a goal that is prepared waits for
+  std::string waiting_for_;                 ///< what the goal that is being prepared waits for, in words
   std::vector<std::unique_ptr<DriverInput>> inputs_;
   std::vector<ros::Subscriber> subscribers_;
 

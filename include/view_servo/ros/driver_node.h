@@ -119,19 +119,19 @@ private:
 
   enum class Stage
   {
-    ACCEPTED,
-    PREPARING,
-    RUNNING
+    ACCEPTED,   ///< the goal thread has not begun with it
+    PREPARING,  ///< in the goal thread
+    RUNNING     ///< it has begun
   };
 
   /** A goal on its way. */
   struct Goal
   {
     Handle handle;
-    Order order;
-    std::string id;
-    double timeout;  ///< [s]
-    std::uint64_t serial;
+    Order order;           ///< the goal's message
+    std::string id;        ///< actionlib's id of the goal
+    double timeout;        ///< the goal ends after this time [s]
+    std::uint64_t serial;  ///< different for each goal, so that prepareGoals() sees whether its goal is still there
     Clock::time_point start = Clock::now();
     Stage stage = Stage::ACCEPTED;
     bool cancelled = false;
@@ -236,6 +236,7 @@ private:
     }
   }
 
+  /** Makes a goal the present one, which must not exist yet, and has it prepared; ends it at once when the gate is closed. */
   void accept(Handle handle)
   {
     handle.setAccepted();
@@ -252,6 +253,7 @@ private:
     wake_.notify_all();
   }
 
+  /** The goal thread: prepares one goal after the other, and begins or refuses it. */
   void prepareGoals()
   {
     std::unique_lock<std::mutex> lock(mutex_);
@@ -292,6 +294,7 @@ private:
     }
   }
 
+  /** Begins the present goal, which is prepared. */
   void begin(std::unique_ptr<typename Driver::Task> task)
   {
     limiter_.stop();
@@ -360,6 +363,7 @@ private:
 
   // ------------------------------------------------------------------------------------------------------- control
 
+  /** One cycle of control: takes goals and cancellations, judges the present goal, and sends a command where one is due. */
   void cycle()
   {
     const ros::Time now = ros::Time::now();
@@ -528,13 +532,13 @@ private:
   std::condition_variable wake_;
   typename Driver::Limiter limiter_;
   StopBurst burst_;
-  std::optional<Clock::time_point> missing_since_;
-  ros::Time last_now_;
-  std::uint64_t serials_ = 0;
-  std::uint64_t prepared_serial_ = 0;
-  bool replaced_ = false;
-  bool stopping_ = false;
-  Timings latencies_;
+  std::optional<Clock::time_point> missing_since_;  // since when an input is missing; empty while all come
+  ros::Time last_now_;                              // ROS' time in the last cycle
+  std::uint64_t serials_ = 0;                       // number of goals accepted so far
+  std::uint64_t prepared_serial_ = 0;               // Goal::serial of the one in the goal thread
+  bool replaced_ = false;                           // another goal has come in this cycle
+  bool stopping_ = false;                           // the node ends
+  Timings latencies_;                               // from an image to the command that follows it
 
   StatusOutput status_;
   Server server_;

@@ -39,11 +39,12 @@ struct HomingTask
   std::string revision;                  ///< ViewStore::revision() of it
   sensor_msgs::CameraInfoConstPtr info;  ///< calibration that `homing` was made with
   std::unique_ptr<Homing> homing;        ///< only the worker's thread uses it
-  bool lesson = false;                   ///< the view is to be learnt: the structure is stored without an arrival
-  bool structure_stored = false;         ///< by storeStructure()
+  bool lesson = false;                   ///< the view is to be learnt: its structure is stored without an arrival, too
+  bool structure_stored = false;         ///< storeStructure() has stored the structure
 };
 
 /**
+ * The task of homing to a stored view.
  * @param info calibration of the images that homing will get. @param mount where their camera is on the base.
  * @throws std::invalid_argument saying why homing to this view by such images cannot be.
  */
@@ -87,9 +88,11 @@ public:
   /** Replaces the task, and forgets what has come for the old one; null: no task. */
   void setTask(const std::shared_ptr<HomingTask>& task);
 
+  /** Pose of the base in odometry's frame. @param stamp by the images' clock [s]. */
   void addOdometry(double stamp, const PlanarPose& base_in_odom);
-  /** @param evidence in pixels of the raw images. */
+  /** Matches of an image. @param stamp of that image [s]. @param evidence in pixels of the raw images. */
   void addMatches(double stamp, const HeadingEvidence& evidence);
+  /** An image with its calibration. */
   void addFrame(const CameraFrame& frame);
 
 private:
@@ -98,8 +101,8 @@ private:
     std::optional<std::shared_ptr<HomingTask>> task;      ///< to which the rest of the inputs belongs; empty: as before
     std::vector<std::pair<double, PlanarPose>> odometry;  ///< by stamp [s]
     std::vector<std::pair<double, HeadingEvidence>> matches;  ///< by stamp [s]
-    std::optional<CameraFrame> frame;                         ///< the newest
-    std::chrono::steady_clock::time_point frame_time;
+    std::optional<CameraFrame> frame;                         ///< the newest image; empty: none has come
+    std::chrono::steady_clock::time_point frame_time;         ///< when that came
   };
 
   void work(const Inputs& inputs);

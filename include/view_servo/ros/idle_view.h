@@ -17,7 +17,7 @@ public:
   {
   }
 
-  /** Empty: none. */
+  /** Name of the view that is followed: the one to be learnt, else the constructor's; empty: none. */
   const std::string& name() const
   {
     return learnt_.empty() ? view_ : learnt_;
@@ -44,11 +44,11 @@ public:
 
 private:
   using Clock = std::chrono::steady_clock;
-  static constexpr std::chrono::minutes PATIENCE{ 5 };
+  static constexpr std::chrono::minutes PATIENCE{ 5 };  // longest time that learning a view may take
 
-  std::string view_;
-  std::string learnt_;
-  Clock::time_point since_;
+  std::string view_;         // of the parameters
+  std::string learnt_;       // to be learnt
+  Clock::time_point since_;  // when learn() was called
 };
 
 }  // namespace view_servo

@@ -17,12 +17,13 @@
 
 namespace view_servo
 {
+/** Where an image comes from. */
 enum class SourceKind
 {
-  CAMERA,
-  VIEW,
-  PATH,
-  IMAGE
+  CAMERA,  ///< the latest image of the node's camera
+  VIEW,    ///< a stored view
+  PATH,    ///< a file
+  IMAGE    ///< the message itself
 };
 
 /**
@@ -39,7 +40,7 @@ struct SourcedImage
   cv::Rect region;               ///< region of interest [px]; empty = the whole image
   std_msgs::Header header;       ///< stamp and camera's frame; empty for a file
   std::optional<Camera> camera;  ///< its calibration; empty where the source has none
-  std::optional<ViewPose> pose;  ///< of the camera, for a stored view that has one
+  std::optional<ViewPose> pose;  ///< the camera's pose, of a stored view that has one; else empty
 };
 
 /** The parameter `~views_dir`: where stored views are. */
@@ -48,7 +49,7 @@ Parameter viewsDirParameter(std::filesystem::path& views_dir);
 /** The parameter `~view`, the name of a stored view. */
 Parameter viewParameter(std::string& view, std::string description);
 
-/** A fault unless `view` is empty or the name that a stored view can have. */
+/** One fault when `view` is neither empty nor a name that a stored view can have; else none. */
 std::vector<std::string> viewFaults(const std::string& view);
 
 /** The directory that an empty `~views_dir` stands for, or the one given. */
@@ -76,6 +77,7 @@ public:
   ImageSourceReader(const ImageSourceParams& params, const CameraInput& camera);
 
   /**
+   * The image that a source names.
    * @param kind what kindOf() returns for the source. @param name as in kindOf().
    * @throws ImageError or ViewStoreError, naming what is wrong in one line.
    */

@@ -16,6 +16,7 @@ template <typename T>
 class Inbox
 {
 public:
+  /** Adds a value. */
   void put(T value)
   {
     const std::lock_guard<std::mutex> lock(mutex_);

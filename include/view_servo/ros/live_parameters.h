@@ -21,16 +21,16 @@ namespace view_servo
 /** A number among a node's parameters that may be changed while the node runs. */
 struct LiveNumber
 {
-  std::string name;
+  std::string name;         ///< of the parameter
   std::string description;  ///< one line, for people, with the unit
-  double value = 0.0;
-  double least = 0.0;
-  double most = 0.0;
+  double value = 0.0;       ///< in effect now
+  double least = 0.0;       ///< smallest value that is allowed
+  double most = 0.0;        ///< largest value that is allowed
 };
 
 /**
- * Those rows of a table that are named, from `least` up to the value that each has now: what the node was started with
- * is the limit. @throws std::invalid_argument for a name that is not one of the table's numbers.
+ * The named rows of a table as numbers that may be changed. Each is allowed from `least` up to the value that it has now, so
+ * that what the node was started with is the limit. @throws std::invalid_argument for a name that is not one of the table's numbers.
  */
 std::vector<LiveNumber> upToNow(const std::vector<Parameter>& table, const std::vector<std::string>& names,
                                 double least);
@@ -54,7 +54,9 @@ public:
   LiveParameters(const ros::NodeHandle& private_nh, std::vector<LiveNumber> numbers, Apply apply);
 
 private:
+  /** Takes over the numbers in `wanted`, each brought within its limits, and calls apply_. */
   void change(const dynamic_reconfigure::Config& wanted);
+  /** The message with one member of each number: what is in effect, or the least or largest values. */
   dynamic_reconfigure::Config config(double LiveNumber::*value) const;
   dynamic_reconfigure::ConfigDescription description() const;
 

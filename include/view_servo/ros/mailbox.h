@@ -17,6 +17,7 @@ template <typename T>
 class Mailbox
 {
 public:
+  /** Puts a value in, in place of one that is there. */
   void put(T value)
   {
     {

@@ -36,8 +36,8 @@ double secondsBetween(const ros::Time& from, const ros::Time& to);
 double ageOf(const ros::Time& stamp);
 
 /**
- * What to do about a message of such an age [s], to be appended to its fault, when it must come from a bag while ROS'
- * clock is not the bag's; else empty.
+ * To be appended to the fault of a message of this age [s]: what to do when the age shows that the message comes from a bag
+ * while ROS' clock is not the bag's; else empty.
  */
 std::string remedyOfAge(double age);
 
@@ -50,7 +50,7 @@ class StampOrder
 public:
   enum Place
   {
-    NEWEST,
+    NEWEST,    ///< newer than all before
     REPEATED,  ///< the newest stamp again
     LATE,      ///< before the newest
     FAR_LATE,  ///< so long before the newest that it belongs to nothing that is known
@@ -79,7 +79,7 @@ private:
 
 /**
  * Runs `body` and catches and logs what it throws, so that no message, timer or thread ends the node.
- * @param what is run, for the log.
+ * @param what is run, in words, for the log.
  * @return the text of what was thrown, in one line; empty when nothing was.
  */
 template <typename Body>

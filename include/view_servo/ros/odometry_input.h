@@ -55,9 +55,9 @@ public:
     return frame_;
   }
 
-  /** Takes what remains of the delay after `~odometry_delay`, see ClockOffset [s]; NaN: not known. */
+  /** @param delay by which odometry is still stamped later than images after the correction [s]; NaN: not known. */
   void setRemainingDelay(double delay);
-  /** How much later than images odometry is stamped; NaN while that is not known [s]. */
+  /** How much later than images odometry is stamped in all, `~odometry_delay` included [s]; NaN while that is not known. */
   double measuredDelay() const
   {
     return measured_delay_;
@@ -74,15 +74,18 @@ private:
   const double delay_;
   double measured_delay_ = std::numeric_limits<double>::quiet_NaN();
   std::string frame_;
-  std::string child_frame_;                  // whose pose odometry is
-  std::optional<PlanarPose> base_in_child_;  // of ~base_frame in that frame
+  std::string child_frame_;                  // the frame whose pose odometry gives
+  std::optional<PlanarPose> base_in_child_;  // pose of ~base_frame in child_frame_; empty until tf knows it
 };
 
 /** A driver's odometry, on `odom`. Used with the node's mutex held. */
 class OdometryInput : public OdometryReader
 {
 public:
-  /** @param on_message is called with what comes, by runLocked(); it shall call read(). */
+  /**
+   * @param timeout the robot stands still after so long without odometry [s]. @param delay as for OdometryReader.
+   * @param on_message is called with each message, by runLocked(), and has to call read().
+   */
   OdometryInput(DriverContext& context, const TransformSource& transforms, const std::string& base_frame,
                 double timeout, double delay, const std::function<void(const nav_msgs::Odometry&)>& on_message);
 

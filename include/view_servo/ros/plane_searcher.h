@@ -25,9 +25,9 @@ class PlaneSearcher
 public:
   struct Search
   {
-    std::uint64_t era;                                ///< chosen by the caller, who can tell outdated answers by it
+    std::uint64_t era;                                ///< a number of the caller's, by which it tells outdated answers
     PlaneFinder::Question question;                   ///< the view, and the image in which it is looked for
-    std::optional<Eigen::Isometry3d> camera_in_odom;  ///< pose of the camera when the image was taken, odom from camera
+    std::optional<Eigen::Isometry3d> camera_in_odom;  ///< the camera's pose when the image was taken; empty: not known
     PlaneFinder::Answer answer;                       ///< set when the search has ended
   };
 
@@ -44,6 +44,7 @@ public:
   /** Whether a search may begin now. */
   bool ready() const;
 
+  /** Begins a search, whose `answer` need not be set; ready() must hold. */
   void begin(Search search);
 
   /** Takes the search that has finished; empty when none has since the last call. */
@@ -58,7 +59,7 @@ private:
   const Clock::duration period_;
   const std::function<void()> on_finished_;
   bool searching_ = false;
-  Clock::time_point next_;
+  Clock::time_point next_;  // when the next search may begin
   std::atomic<bool> stopping_{ false };
   Mailbox<Search> questions_;
   Mailbox<Search> answers_;

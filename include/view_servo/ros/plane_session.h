@@ -62,6 +62,7 @@ public:
   cv::Mat overlay(const std::string& text) const;
 
 private:
+  /** Forgets all that was found. */
   void reset();
 
   PlaneTrackerParams params_;
@@ -70,13 +71,13 @@ private:
   CameraWarp rectification_;
   CameraWarp view_warp_;  // from the view's camera to the rectified one
   cv::Mat reference_;     // without distortion, as all that follows
-  cv::Rect region_;
+  cv::Rect region_;       // of reference_ that shows the plane [px]
   bool calibration_changed_ = false;
   StampOrder order_;
-  cv::Mat last_image_;
+  cv::Mat last_image_;  // rectified
   std::unique_ptr<PlaneTracker> tracker_;
-  std::optional<Eigen::Matrix3d> last_h_;  // where the plane was tracked last
-  Points path_;                            // of the region's middle, the point that servo_25d leads [px]
+  std::optional<Eigen::Matrix3d> last_h_;  // where the plane was tracked last, x_cur ~ H x_ref, rectified [px]
+  Points path_;  // where the region's middle, which servo_25d leads, has been [px], newest last
 };
 
 }  // namespace view_servo

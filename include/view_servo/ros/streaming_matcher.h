@@ -45,14 +45,14 @@
 
 namespace view_servo
 {
-/** @name Default rates of matching camera images [Hz], which a machine of two cores reaches while other nodes run, too.
+/** @name Default rates of matching camera images [Hz]; a machine of two cores reaches them while other nodes run, too.
  * @{ */
 constexpr double POINTS_RATE = 5.0;
 constexpr double LINES_RATE = 10.0;
 constexpr double SCENE_RATE = 2.0;
 /** @} */
 
-/** Parameters of a StreamingMatcher besides those of its way of matching. */
+/** Parameters of a StreamingMatcher besides those of its `Matching`. */
 struct StreamingMatcherParams
 {
   CameraInputParams camera;
@@ -80,7 +80,7 @@ struct MatchLabel
 {
   std_msgs::Header header;  ///< of the camera image
   ChosenView chosen;        ///< which view the message is about, and for which goal
-  bool refused = false;     ///< the view cannot be matched whatever the camera sees
+  bool refused = false;     ///< whether the view cannot be matched, whatever the camera sees
 };
 
 /**
@@ -180,8 +180,8 @@ private:
   /** What diagnostics report of the last image. */
   struct LastResult
   {
-    bool failed = false;
-    std::string text = "no image was matched";
+    bool failed = false;                        ///< the image could not be matched: an error
+    std::string text = "no image was matched";  ///< what came of it, in one line
   };
 
   StreamingMatcher(const ros::NodeHandle& nh, const ros::NodeHandle& private_nh, const Params& params)

@@ -10,11 +10,11 @@
 
 namespace view_servo
 {
-/** How long something took that happens again and again, from one diagnosis to the next. Not guarded against threads. */
+/** Times that something took, from one diagnosis to the next. Not for several threads at once. */
 class Timings
 {
 public:
-  /** @param duration [ms]. */
+  /** Adds one time. @param duration [ms]. */
   void add(double duration)
   {
     count_ += 1;

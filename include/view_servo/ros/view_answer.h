@@ -46,7 +46,7 @@ public:
   {
     return refusal_;
   }
-  /** Says so when the last message was about another view; else empty. */
+  /** A sentence that names the other view, when the last message was about another one; else empty. */
   const std::string& otherView() const
   {
     return other_view_;

@@ -23,7 +23,7 @@ struct ChosenView
 class ViewChoice
 {
 public:
-  /** A person's choice. */
+  /** A person's choice. @param view name of a stored view; empty: none. */
   void choose(const std::string& view);
 
   /**
@@ -33,6 +33,7 @@ public:
    */
   bool want(const WantedView& message);
 
+  /** The choice that counts now. */
   const ChosenView& chosen() const
   {
     return chosen_;

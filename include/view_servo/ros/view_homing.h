@@ -59,21 +59,24 @@ public:
 
   // ------------------------------------------------------------------- for prepare(): they wait, without the mutex
 
-  /** Asks matchers for a view, and waits for an image that is new, odometry and tf. @throws what waitFor() throws. */
+  /**
+   * Asks matchers for a view, and waits for odometry, tf, and an image that comes after the call, which is returned.
+   * @throws what DriverContext::waitFor() throws.
+   */
   CameraFrame waitForInputs(const std::string& view);
   /** Waits until a matcher has answered. @throws std::runtime_error also when all refuse the view. */
   void waitForAnswer();
 
   // ------------------------------------------------------------------------------------------- with or without it
 
-  /** @throws std::runtime_error saying why homing to the view by such frames cannot be. */
+  /** The task of homing to a view. @throws std::runtime_error saying why homing by such frames cannot be. */
   std::shared_ptr<HomingTask> makeTask(const LearntView& stored, const CameraFrame& frame,
                                        const HomingParams& params) const;
   const ViewStore& store() const
   {
     return store_;
   }
-  /** Of the base. */
+  /** Name of the base's frame. */
   const std::string& frame() const
   {
     return base_frame_;
@@ -81,38 +84,40 @@ public:
 
   // ------------------------------------------------------------------------------------------------- with the mutex
 
-  /** Which view, for which goal, matches have to be about from now on; empty: none. */
+  /** From now on only matches of this view, for this goal, are used. @param view empty: none. @param goal its id. */
   void want(const std::string& view, const std::string& goal);
   /** Replaces the task, and forgets all that belongs to the old one; null: no task. */
   void setTask(std::shared_ptr<HomingTask> task);
-  /** Whether the base may move without matches although the view's points are not tracked; until setTask(). */
+  /** Sets whether the base may move without matches although the view's points are not tracked; setTask() sets false. */
   void setDoesWithoutMatches(bool does);
-  /** The way travelled counts from here. */
+  /** Makes travelled() zero. */
   void restartWay()
   {
     travelled_ = 0.0;
   }
 
+  /** The task set last; null: none. */
   const std::shared_ptr<HomingTask>& task() const
   {
     return task_;
   }
+  /** What the newest outcome of the task says. */
   const HomingReport& report() const
   {
     return report_;
   }
-  /** The newest pose in odometry's frame; empty before the first. */
+  /** The newest pose of the base in odometry's frame; empty before the first. */
   const std::optional<PlanarPose>& base() const
   {
     return base_in_odom_;
   }
-  /** By odometry, since restartWay() [m]. */
+  /** Length of the base's way since restartWay(), by odometry [m]. */
   double travelled() const
   {
     return travelled_;
   }
 
-  /** The velocity along a course by the newest odometry; zero from the first image whose stamp is apart from odometry's on. */
+  /** The velocity along a course, by the newest odometry. Zero while stamps of images and odometry are too far apart. */
   BaseVelocity follow(const Course& course) const;
   /** The same along the course of homing. */
   BaseVelocity wanted() const
@@ -152,13 +157,13 @@ private:
   const HomingDriverParams& params_;
   const Hooks hooks_;
   const std::string base_frame_;
-  DriverInput& images_;
-  DriverInput& outcomes_;
+  DriverInput& images_;    // usable images
+  DriverInput& outcomes_;  // of the worker
   TransformSource transforms_;
   OdometryInput odometry_;
-  DriverInput& matches_;
-  ViewAnswer points_;
-  ViewAnswer lines_;
+  DriverInput& matches_;  // of either matcher
+  ViewAnswer points_;     // of point_matches
+  ViewAnswer lines_;      // of line_matches
   const ViewStore store_;
   const BaseOutput output_;
 
@@ -168,9 +173,9 @@ private:
   std::optional<PlanarPose> base_in_odom_;
   MotionWatch motion_;
   double travelled_ = 0.0;
-  int odd_stamps_ = 0;
-  bool matches_needed_ = true;
-  bool does_without_matches_ = false;
+  int odd_stamps_ = 0;                           // images in a row whose stamps are too far from odometry's
+  bool matches_needed_ = true;                   // because the view's points are not tracked
+  bool does_without_matches_ = false;            // see setDoesWithoutMatches()
   std::optional<Clock::time_point> unanswered_;  // when an image came that was worked on, until a command follows
 
   HomingWorker worker_;

@@ -21,7 +21,7 @@ struct HomographyAlignerParams
 {
   int max_points = 200;          ///< corners of the stored view that are looked for
   int patch_radius = 10;         ///< patches of (2 r + 1)² pixels are compared; on coarse levels smaller ones
-  int levels = 4;                ///< number of levels of the pyramids, the image included; more catch faster motion
+  int levels = 4;                ///< number of levels of the image pyramids, the image itself included, >= 1
   double min_correlation = 0.7;  ///< least correlation of a patch that counts as found again
   double max_residual = 2.0;  ///< largest distance between where a supporting point is found and where H sends it [px]
   int min_supporting = 15;    ///< least number of points that support a homography
@@ -38,8 +38,8 @@ std::vector<Parameter> parameters(HomographyAlignerParams& params);
 /** The homography of an image, when there is one. */
 struct TrackedHomography
 {
-  bool found = false;
-  Eigen::Matrix3d h = Eigen::Matrix3d::Constant(std::numeric_limits<double>::quiet_NaN());  ///< x_cur ~ H x_ref
+  bool found = false;  ///< whether enough points support a homography
+  Eigen::Matrix3d h = Eigen::Matrix3d::Constant(std::numeric_limits<double>::quiet_NaN());  ///< x_cur ~ H x_ref [px]
   int looked_for = 0;                                     ///< points predicted to be in the image
   int supporting = 0;                                     ///< of these, found where the homography sends them
   Points points;                                          ///< the supporting ones, in the stored view [px]

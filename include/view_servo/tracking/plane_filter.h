@@ -26,8 +26,8 @@ struct PlaneFilterParams
   double window = 0.1;
   int max_measurements = 60;  ///< largest number of measurements that are averaged
   /**
-   * A decomposition is dropped when its normals' mean squared angle from their mean is this many times that of the
-   * other.
+   * Of two decompositions, the one whose normals scatter more is dropped once their mean squared angle from their mean is
+   * this many times that of the other one's.
    */
   double decision = 4.0;
 
@@ -41,9 +41,9 @@ std::vector<Parameter> parameters(PlaneFilterParams& params);
 /** What the filter knows after a measurement. */
 struct PlaneEstimate
 {
-  EuclideanHomography motion;      ///< to the last camera: X_cur = R X_ref + t, t over d; averaged
-  bool normal_known = false;       ///< if not, the plane is assumed to face the reference camera
-  bool ambiguous = false;          ///< another decomposition is as likely
+  EuclideanHomography motion;  ///< from the reference to the last camera, averaged: R, t / d and the plane's normal
+  bool normal_known = false;   ///< false: the normal is not known yet, and assumed to be the reference's optical axis
+  bool ambiguous = false;      ///< another decomposition has not been ruled out
   std::optional<double> distance;  ///< d, of the plane from the reference camera [m]; empty until it is known
 };
 
@@ -90,9 +90,9 @@ private:
   /** One decomposition through time. */
   struct Track
   {
-    Eigen::Vector3d normals = Eigen::Vector3d::Zero();  // weighted sum
-    double weight = 0.0;
-    std::size_t count = 0;
+    Eigen::Vector3d normals = Eigen::Vector3d::Zero();  // weighted sum of the normals seen
+    double weight = 0.0;                                // sum of their weights
+    std::size_t count = 0;                              // number of the normals seen
 
     void add(const EuclideanHomography& solution);
     Eigen::Vector3d normal() const
@@ -105,7 +105,7 @@ private:
 
   void followNormals(const std::vector<EuclideanHomography>& solutions);
   void remember(const Measurement& measurement);
-  /** Of the plane, as far as it is known. */
+  /** The plane's normal in the reference camera's frame; the optical axis while it is not known. */
   Eigen::Vector3d normal() const;
   std::optional<double> distance() const;
 

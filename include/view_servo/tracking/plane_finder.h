@@ -35,18 +35,20 @@ public:
   {
     std::optional<Eigen::Matrix3d> h;  ///< x_cur ~ H x_ref [px]; empty: not found
     Correspondences inliers;           ///< matches that agree with h [px]
-    std::string reason;                ///< why the view was not found, in one line
+    std::string reason;                ///< why the view was not found, in one line; empty when it was
   };
 
   /** @throws std::invalid_argument with all faults of the parameters. */
   explicit PlaneFinder(const PointViewMatcherParams& params);
 
+  /** What Question::view has to be prepared with. */
   FeatureParams features() const
   {
     return matcher_.params().points;
   }
 
   /**
+   * Looks for the view in the image.
    * @param given_up as in PointViewMatcher::match(); once it holds, nothing is found.
    * @throws std::invalid_argument when the image has the wrong type.
    */

@@ -81,6 +81,7 @@ public:
    */
   const PlaneTrack& add(const cv::Mat& image, const std::optional<Eigen::Isometry3d>& camera_in_odom);
 
+  /** What the last add() returned. */
   const PlaneTrack& track() const
   {
     return track_;
@@ -96,7 +97,7 @@ private:
   /** Where the plane was found last. */
   struct Place
   {
-    Eigen::Matrix3d h;
+    Eigen::Matrix3d h;  // x_cur ~ H x_ref [px]
     std::optional<Eigen::Isometry3d> camera_in_odom;
   };
 
@@ -107,8 +108,8 @@ private:
   HomographyAligner aligner_;
   PlaneFilter filter_;
   std::optional<Place> last_;
-  bool found_once_ = false;
-  int missed_ = 0;
+  bool found_once_ = false;  // the plane has been tracked in some image
+  int missed_ = 0;           // images in a row without the plane
   PlaneTrack track_;
 };
 

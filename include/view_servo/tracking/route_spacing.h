@@ -16,9 +16,9 @@ namespace view_servo
 /** When a route needs its next view. */
 struct RouteSpacingParams
 {
-  double distance = 0.5;      ///< from the last view [m]
-  double turn = 0.2618;       ///< since the last view [rad]
-  double min_in_sight = 0.6;  ///< least share of the last view that is still in sight, [0, 1]
+  double distance = 0.5;      ///< the next view is due at this distance from the last one [m]
+  double turn = 0.2618;       ///< it is due after this turn since the last one [rad]
+  double min_in_sight = 0.6;  ///< it is due when a smaller share of the last one is in sight, [0, 1)
 };
 
 /** Names, units and ranges of these parameters. */

@@ -20,14 +20,14 @@ namespace view_servo
 /** Options of the view tracker. */
 struct ViewTrackerParams
 {
-  int max_landmarks = 200;  ///< points of the stored view that are tracked
+  int max_landmarks = 200;  ///< largest number of points of the stored view that are tracked
   int window = 21;          ///< side of the patches [px]
   int levels = 2;           ///< number of levels of the pyramid besides the image
   /** Largest distance between where a supporting point is found and where the pose sends it [px] */
   double max_residual = 2.0;
   int min_supporting = 15;    ///< least number of points that support a pose
   double min_support = 0.35;  ///< least share of the points looked for that have to support the pose, (0, 1]
-  /** Points whose change of size differs by more than this part from the typical one are left out. */
+  /** Points whose images have grown or shrunk by a factor that differs by more than this part from the median are left out. */
   double max_scale_difference = 0.35;
   double assumed_depth = 2.5;  ///< depth of points while nothing is known of it [m]
 
@@ -62,26 +62,29 @@ public:
   /** A point of the stored view that is tracked. */
   struct Point
   {
-    Landmark landmark;
-    double information = 0.0;                         ///< of the inverse depth
+    Landmark landmark;         ///< where it is in the stored view, and its inverse depth
+    double information = 0.0;  ///< inverse variance of the inverse depth, for errors of 1 in level points
     Eigen::Vector2d pixel = Eigen::Vector2d::Zero();  ///< in the stored view as the camera would have taken it
   };
 
+  /** The points that are tracked; empty before start() and restore(). */
   const std::vector<Point>& points() const
   {
     return landmarks_;
   }
 
+  /** Whether there are points to track. */
   bool hasStructure() const
   {
     return !landmarks_.empty();
   }
+  /** Forgets all points. */
   void clear()
   {
     landmarks_.clear();
   }
 
-  /** Whether the landmarks' depths came from two views far enough apart; else they are assumed. */
+  /** Whether the points' depths came from two views far enough apart; if not, they are assumed. */
   bool depthsKnown() const
   {
     return depths_known_;
@@ -100,7 +103,7 @@ public:
    */
   bool restore(const std::vector<Point>& points);
 
-  /** More landmarks from such matches, and better depths for those there are. */
+  /** Adds landmarks from such matches, and improves the depths of those there are. Arguments as for start(). */
   void extend(const Correspondences& matches, const PlanarPose& pose);
 
   struct Result
@@ -115,7 +118,7 @@ public:
     /** track(): landmarks predicted to be in the image, in about its scale; locate(): those matched. */
     int looked_for = 0;
     int supporting = 0;         ///< landmarks found where the pose puts them
-    double rms = 0.0;           ///< root mean square of the supporting ones' residuals [px]
+    double rms = 0.0;           ///< root mean square of the supporting landmarks' residuals [px]
     double displacement = 0.0;  ///< median distance of the supporting ones from where the stored view has them [px]
     std::vector<Eigen::Vector2d> supporters;  ///< Landmark::reference of the supporting ones
   };
@@ -139,9 +142,12 @@ public:
   Result locate(const Correspondences& matches) const;
 
 private:
+  /** Level point -> pixel of an image, distortion applied; levelOf() is the inverse. */
   Eigen::Vector2d pixelOf(const Eigen::Vector2d& level_point) const;
   Eigen::Vector2d levelOf(const Eigen::Vector2d& pixel) const;
+  /** Whether a patch around a pixel lies in the stored view. */
   bool insideReference(const Eigen::Vector2d& pixel) const;
+  /** The point at a level point of the stored view; null when there is none near enough to be the same. */
   const Point* nearest(const Eigen::Vector2d& level_point) const;
   /** The pose that most sightings agree with to within a residual [px]. */
   Result fit(const std::vector<Sighting>& sightings, double max_residual) const;
@@ -149,7 +155,7 @@ private:
   Camera camera_;
   CameraMount mount_;
   ViewTrackerParams params_;
-  cv::Mat reference_;  // normalised against light
+  cv::Mat reference_;  // the stored view, each pixel less the mean around it and over the deviation around it
   std::vector<Point> landmarks_;
   bool depths_known_ = false;
 };

@@ -23,7 +23,7 @@ struct LineMatcherParams
   LineSegmentParams segments;
   LineFeatureParams features;
   LineRegionParams regions;
-  RansacParams ransac;  ///< for points and lines; the inlier threshold is that of points [px]
+  RansacParams ransac;  ///< for points and lines; its inlier threshold is used for points only [px]
   LinePlaneParams planes;
   double min_quality = 0.5;           ///< least MatchedLine::score of a match
   double min_log_significance = 6.0;  ///< least ViewMatch::log_significance of a geometry that is accepted

@@ -29,13 +29,13 @@ cv::Mat drawOverlay(const PreparedImage& reference, const PreparedImage& current
 /** A stored view that is tracked, for drawFollowedView(). */
 struct FollowedView
 {
-  cv::Rect region;  ///< of the stored view [px]
+  cv::Rect region;  ///< region of the stored view that is tracked [px]
   /** x_cur ~ H x_ref; NaN: not found. */
   Eigen::Matrix3d h = Eigen::Matrix3d::Constant(std::numeric_limits<double>::quiet_NaN());
   Points found;    ///< points of the stored view that were found, at their places there [px]; drawn where h sends them
-  Points missing;  ///< those that were not found, likewise
+  Points missing;  ///< points of the stored view that were not found, at their places there [px]
   Points path;     ///< where the view's chosen point has been, in current pixels, newest last
-  std::string text;  ///< one line
+  std::string text;  ///< one line, drawn below
 };
 
 /**

@@ -21,7 +21,7 @@ namespace view_servo
 /** Where the constraint on five points is used (thesis 6.3); it has no meaning for homographies within RANSAC. */
 enum class ViewConsistency
 {
-  OFF,
+  OFF,     ///< nowhere
   BEFORE,  ///< method 1: candidates are filtered; for GeometryEstimator::RANSAC
   WITHIN   ///< method 2: samples are tested
 };
@@ -29,7 +29,7 @@ enum class ViewConsistency
 /** How a geometry is found in an association (thesis ch. 9). */
 enum class GeometryEstimator
 {
-  RANSAC,            ///< one candidate a point
+  RANSAC,            ///< one candidate for each point
   MULTI_HYPOTHESIS,  ///< samples from the candidates, support from all associations: the modified algorithm (9.5.1)
   IMPORTANCE         ///< samples and support from all associations: Algorithm 2, which takes many iterations
 };
@@ -51,7 +51,7 @@ struct PointViewMatcherParams
    */
   double first_share = 0.6;
   bool scale_search = true;  ///< try other scale ratios and coarser scales when the full images give no geometry
-  bool side_search = true;   ///< then try the reference as it would look from the sides
+  bool side_search = true;   ///< when that fails, too, try the reference as it would look from the sides
   double min_log_significance = 6.0;  ///< least ViewMatch::log_significance of a geometry that is accepted
   bool unique = true;                 ///< refuse a geometry when another one, a shift off, fits nearly as well
   bool refuse_mirrored = true;        ///< refuse a current image that shows the reference better when mirrored

@@ -32,9 +32,9 @@ struct FeatureParams
   {
   }
 
-  PointMatcherParams points;
-  LineSegmentParams segments;
-  LineFeatureParams lines;
+  PointMatcherParams points;   ///< of corners and profiles
+  LineSegmentParams segments;  ///< of line segments
+  LineFeatureParams lines;     ///< of what matching of line segments needs
 };
 
 /**
@@ -48,10 +48,10 @@ struct FeatureParams
 class PreparedImage
 {
 public:
-  static constexpr int SCALES = 5;
-  static constexpr int SIDES = 8;
-  static constexpr int LEVELS = SCALES + SIDES;
-  static constexpr double TILT = 5.5;
+  static constexpr int SCALES = 5;               ///< number of levels that are the image reduced
+  static constexpr int SIDES = 8;                ///< number of levels that are the image from the sides
+  static constexpr int LEVELS = SCALES + SIDES;  ///< number of all levels
+  static constexpr double TILT = 5.5;            ///< factor by which these are compressed
 
   /**
    * @param grey 8-bit, one channel; the data is shared and must not be changed afterwards.
@@ -76,7 +76,9 @@ public:
 
   /** The image of level `number`; ones that would be too small are empty, and so are their features. */
   const cv::Mat& image(int number) const;
+  /** Corners and profiles of level `number`, in its own pixels. */
   const PointFeatures& points(int number) const;
+  /** The index over the profiles of level `number`. */
   const ProfileIndex& profileIndex(int number) const;
 
   /** The line segments of the full image, in its region. @throws what detectLineSegments() and LineFeatures throw. */

@@ -14,8 +14,8 @@ namespace view_servo
 struct RouteStop
 {
   std::string view;    ///< name of the stored view
-  PlanarPose base;     ///< of the base in Route::frame [m, rad]
-  double stamp = 0.0;  ///< when the image was taken [s since the epoch of its clock]
+  PlanarPose base;     ///< pose of the base in Route::frame [m, rad]
+  double stamp = 0.0;  ///< when the image was taken, as its header says [s]
 };
 
 /** Stored views in the order in which a base passed them. */
@@ -26,6 +26,7 @@ struct Route
   std::vector<RouteStop> stops;  ///< 2 to MAX_ROUTE_STOPS, of different views
 };
 
+/** Largest number of stops of a route. */
 constexpr std::size_t MAX_ROUTE_STOPS = 10000;
 
 /** Whether a name is one of a view (see isValidViewName()) and leaves room for the numbers of its views: 58 characters at most. */

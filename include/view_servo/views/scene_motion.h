@@ -16,8 +16,8 @@ namespace view_servo
 /** How the camera moved from the reference to the current view, as far as matches of a scene with depth tell. */
 struct SceneMotion
 {
-  RelativePose pose;  ///< X_cur = R X_ref + t, the length of t unknown
-  /** See covarianceOf(). Matches that lie near each other err alike, which is allowed for. */
+  RelativePose pose;  ///< X_cur = R X_ref + t, t of length 1, as its true length is not known
+  /** Of rotation [rad] and t, as covarianceOf() gives it. Matches that lie near each other err alike, which is allowed for. */
   Eigen::Matrix<double, 6, 6> covariance = Eigen::Matrix<double, 6, 6>::Zero();
   std::size_t inliers = 0;  ///< matches that agree with the motion
 };

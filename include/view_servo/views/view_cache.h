@@ -37,7 +37,7 @@ private:
   struct Entry
   {
     CachedView view;
-    std::string revision;
+    std::string revision;  // ViewStore::revision() of it
   };
 
   ViewStore store_;

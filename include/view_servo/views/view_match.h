@@ -21,11 +21,12 @@ enum class GeometryModel
   FUNDAMENTAL  ///< x_curᵀ F x_ref = 0, for scenes with depth
 };
 
+/** What came of matching. */
 enum class MatchOutcome
 {
-  MATCHED,
-  TOO_FEW_FEATURES,
-  NO_GEOMETRY
+  MATCHED,           ///< a geometry was found
+  TOO_FEW_FEATURES,  ///< an image has too few corners or segments to try
+  NO_GEOMETRY        ///< no geometry was found, or the one found is not trusted
 };
 
 /** A candidate match of two points: corners (PointViewMatcher), intersections (LineViewMatcher), or both. */
@@ -53,21 +54,21 @@ struct MatchedLine
 /** How long one stage of matching took. */
 struct StageTime
 {
-  std::string name;
-  double ms;
+  std::string name;  ///< of the stage
+  double ms;         ///< [ms]
 };
 
 /** The result of matching a stored view (`reference`) with a live image (`current`), by points, lines or both. */
 struct ViewMatch
 {
   MatchOutcome outcome = MatchOutcome::NO_GEOMETRY;
-  std::string message;  ///< one line, for people
-  GeometryModel model = GeometryModel::HOMOGRAPHY;
+  std::string message;                              ///< what was found, or why nothing was: one line, for people
+  GeometryModel model = GeometryModel::HOMOGRAPHY;  ///< what `matrix` is
   /** NaN unless MATCHED; H with H(2,2) = 1 where possible, F with norm 1. */
   Eigen::Matrix3d matrix = Eigen::Matrix3d::Constant(std::numeric_limits<double>::quiet_NaN());
   std::vector<MatchedPoint> matches;  ///< all candidates, best first
-  int inliers = 0;                    ///< data that agree with `matrix`: points; for LineViewMatcher's H, lines
-  /** Of the inliers: transfer error in one image (H) or Sampson distance (F) [px]; NaN: none. */
+  int inliers = 0;  ///< number of points, or for LineViewMatcher's H of lines, that agree with `matrix`
+  /** Root mean square over the inliers of the transfer error in one image (H) or the Sampson distance (F) [px]; NaN: none. */
   double rms_error = std::numeric_limits<double>::quiet_NaN();
   RansacStatistics ransac;        ///< of the attempt that succeeded, else of the last
   std::vector<StageTime> stages;  ///< in the order of their ends

@@ -26,8 +26,8 @@ struct ViewRecognizerParams
 {
   BinaryFeatureParams features;
   ViewIndexParams index;
-  SceneMatcherParams matching;  ///< of the verification
-  int candidates = 10;          ///< the most likely views, which are verified
+  SceneMatcherParams matching;  ///< of the matcher that verifies
+  int candidates = 10;          ///< largest number of views that are verified, the most likely ones
 
   /** Each fault in one line, those of nested parameters included; empty when the parameters are usable. */
   std::vector<std::string> validate() const;
@@ -42,7 +42,7 @@ std::vector<Parameter> parameters(ViewRecognizerParams& params);
 /** Where a recognizer's views come from. Both functions may be called from several threads. */
 struct ViewSource
 {
-  std::filesystem::path directory;
+  std::filesystem::path directory;  ///< where the views are, and the index is kept
   /** All views, each with a text that changes whenever the view does. @throws std::runtime_error. */
   std::function<std::map<std::string, std::string>()> revisions;
   /** @throws std::runtime_error when the view cannot be read. */
@@ -87,8 +87,8 @@ public:
 
   struct Update
   {
-    std::size_t added = 0;  ///< views that are new or were changed
-    std::size_t removed = 0;
+    std::size_t added = 0;    ///< views that are new or were changed
+    std::size_t removed = 0;  ///< views that are gone
     std::size_t waiting = 0;  ///< views that still have to be added
     /** Why views that are new or were changed cannot be read, one line each. They are tried again once they change. */
     std::vector<std::string> unreadable;

@@ -33,7 +33,7 @@ struct StoredView
   cv::Mat image;                 ///< 8-bit grey, as the camera took it, with the lens's distortion
   cv::Rect region;               ///< region of interest [px]; empty = the whole image
   std::optional<Camera> camera;  ///< its calibration; empty: not known
-  double stamp = 0.0;            ///< when the image was taken [s since the epoch of its clock]
+  double stamp = 0.0;            ///< when the image was taken, as its header says [s]
   std::string frame_id;          ///< optical frame of the camera, may be empty
   std::optional<ViewPose> pose;  ///< pose of the frame `frame_id`; empty where tf did not know it
 };
@@ -70,6 +70,7 @@ public:
   /** The directory need not exist until something is saved. */
   explicit ViewStore(std::filesystem::path directory);
 
+  /** The directory that the views are in. */
   const std::filesystem::path& directory() const
   {
     return directory_;

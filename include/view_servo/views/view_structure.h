@@ -14,7 +14,7 @@ struct StructurePoint
 {
   Eigen::Vector2d pixel = Eigen::Vector2d::Zero();  ///< in the stored image, with the lens's distortion [px]
   double inverse_depth = 0.0;  ///< > 0: 1 / depth along the axis of the view's level camera (planar_motion.h) [1/m]
-  double information = 0.0;    ///< > 0: 1 / variance of it, for errors of 1 in level points [m^2]
+  double information = 0.0;    ///< > 0: 1 / variance of inverse_depth, for errors of 1 in level points [m²]
 };
 
 /** What has been learnt of where the things are that a stored view shows. */
