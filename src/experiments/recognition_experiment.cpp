@@ -497,7 +497,10 @@ ViewSource heldViews(const std::map<std::string, cv::Mat>& images)
     view.image = images.at(name);
     return view;
   };
-  return { {}, revisions, load };
+  const auto structure = [](const std::string& /*name*/) {
+    return ViewStructure();
+  };
+  return { {}, revisions, load, structure };
 }
 
 /** The walk's queries and changed pictures of unknown scenes, each verified. */

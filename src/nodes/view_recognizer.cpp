@@ -29,6 +29,7 @@
 #include <chrono>
 #include <condition_variable>
 #include <cstddef>
+#include <cstdint>
 #include <functional>
 #include <mutex>
 #include <optional>
@@ -56,9 +57,20 @@ std::vector<RecognizedView> toMessages(const std::vector<CandidateView>& views)
     message.score = view.score;
     message.verified = view.verified;
     message.inliers = view.inliers;
+    message.has_pose = static_cast<std::uint8_t>(view.pose.has_value());
+    if (view.pose)
+    {
+      message.pose = toPoseWithCovariance(*view.pose);
+    }
     messages.push_back(message);
   }
   return messages;
+}
+
+/** Empty for a camera that cannot be used: views are recognized without poses then. */
+std::optional<Camera> usable(const std::optional<Camera>& camera)
+{
+  return camera && camera->fault().empty() ? camera : std::nullopt;
 }
 
 /** What was found, in one line. @param indexed number of views among which the image was looked for. */
@@ -142,7 +154,8 @@ private:
     const auto begin = Clock::now();
     const PreparedImage image(source.grey, source.region, recognizer_.features());
     const auto most = static_cast<std::size_t>(std::max(1, request.max_results));
-    const std::vector<CandidateView> views = recognizer_.recognize(image, most, request.verify, given_up_);
+    const std::vector<CandidateView> views =
+        recognizer_.recognize(image, most, request.verify, given_up_, usable(source.camera));
     response.elapsed_ms = std::chrono::duration<double, std::milli>(Clock::now() - begin).count();
     response.success = !views.empty() && (views.front().verified || !request.verify);
     response.message = describe(views, recognizer_.size(), request.verify) + behind;
@@ -171,7 +184,8 @@ private:
   void recognizeFrame(const CameraFrame& frame)
   {
     const PreparedImage image(toGrey(*frame.image), cv::Rect(), recognizer_.features());
-    const std::vector<CandidateView> views = recognizer_.recognize(image, 1, true, given_up_);
+    const std::vector<CandidateView> views =
+        recognizer_.recognize(image, 1, true, given_up_, usable(toCamera(*frame.info)));
     if (given_up_())
     {
       return;

@@ -254,6 +254,18 @@ geometry_msgs::PoseStamped toPoseStamped(const ViewPose& pose, const ros::Time& 
   return message;
 }
 
+geometry_msgs::PoseWithCovariance toPoseWithCovariance(const StructurePose& pose)
+{
+  geometry_msgs::PoseWithCovariance message;
+  const Eigen::Vector3d position = pose.view_from_current.translation();
+  message.pose.position.x = position.x();
+  message.pose.position.y = position.y();
+  message.pose.position.z = position.z();
+  message.pose.orientation = toMessage(Eigen::Quaterniond(pose.view_from_current.linear()));
+  Eigen::Map<Eigen::Matrix<double, 6, 6, Eigen::RowMajor>>(message.covariance.data()) = pose.covariance;
+  return message;
+}
+
 std::vector<PointMatch> toPointMatches(const std::vector<MatchedPoint>& matches)
 {
   std::vector<PointMatch> messages(matches.size());

@@ -95,9 +95,13 @@ ViewSource storedViews(const ViewStore& store)
     }
     return listed->revisions;
   };
-  return { store.directory(), revisions, [store](const std::string& name) {
-            return store.load(name);
-          } };
+  const auto load = [store](const std::string& name) {
+    return store.load(name);
+  };
+  const auto structure = [store](const std::string& name) {
+    return store.loadStructure(name);
+  };
+  return { store.directory(), revisions, load, structure };
 }
 
 ViewSource imageFiles(const fs::path& directory)
@@ -119,7 +123,10 @@ ViewSource imageFiles(const fs::path& directory)
     view.image = readGreyImage((directory / name).string());
     return view;
   };
-  return { directory, revisions, load };
+  const auto structure = [](const std::string& /*name*/) {
+    return ViewStructure();
+  };
+  return { directory, revisions, load, structure };
 }
 
 ViewRecognizer::ViewRecognizer(ViewSource source, const ViewRecognizerParams& params)
@@ -194,7 +201,13 @@ ViewRecognizer::Update ViewRecognizer::update(std::size_t most)
   return update;
 }
 
-std::shared_ptr<const PreparedImage> ViewRecognizer::prepared(const std::string& name) const
+ViewRecognizer::Prepared::Prepared(StoredView&& stored, std::string stored_revision, const FeatureParams& features)
+  : revision(std::move(stored_revision)), image(stored.image, stored.region, features), view(std::move(stored))
+{
+  view.image = cv::Mat();
+}
+
+std::shared_ptr<const ViewRecognizer::Prepared> ViewRecognizer::prepared(const std::string& name) const
 {
   std::string revision;
   {
@@ -202,40 +215,59 @@ std::shared_ptr<const PreparedImage> ViewRecognizer::prepared(const std::string&
     const auto known = revisions_.find(name);
     if (known == revisions_.end())
     {
-      return nullptr;  // removed meanwhile
+      return nullptr;
     }
     revision = known->second;
-    const auto found = std::find_if(prepared_.begin(), prepared_.end(), [&](const Prepared& entry) {
-      return entry.name == name && entry.revision == revision;
+    const auto found = std::find_if(prepared_.begin(), prepared_.end(), [&](const auto& entry) {
+      return entry->view.name == name && entry->revision == revision;
     });
     if (found != prepared_.end())
     {
       prepared_.splice(prepared_.begin(), prepared_, found);
-      return found->image;
+      return prepared_.front();
     }
   }
-  std::shared_ptr<const PreparedImage> image;
+  std::shared_ptr<const Prepared> entry;
   try
   {
-    const StoredView view = source_.load(name);
-    image = std::make_shared<const PreparedImage>(view.image, view.region, features());
+    StoredView view = source_.load(name);
+    view.name = name;
+    entry = std::make_shared<const Prepared>(std::move(view), std::move(revision), features());
   }
   catch (const std::exception&)
   {
     return nullptr;  // update() will say why
   }
   const std::lock_guard<std::mutex> lock(mutex_);
-  prepared_.push_front({ name, revision, image });
+  prepared_.push_front(entry);
   if (prepared_.size() > static_cast<std::size_t>(params_.candidates))
   {
     prepared_.pop_back();
   }
-  return image;
+  return entry;
+}
+
+std::optional<StructurePose> ViewRecognizer::poseIn(const StoredView& view, const ViewMatch& match,
+                                                    const Camera& camera) const
+{
+  try
+  {
+    return structurePose(match, view, source_.structure(view.name), camera);
+  }
+  catch (const std::exception&)
+  {
+    return std::nullopt;  // damaged, or removed meanwhile: as if nothing were known
+  }
 }
 
 std::vector<CandidateView> ViewRecognizer::recognize(const PreparedImage& image, std::size_t most, bool verify,
-                                                     const std::function<bool()>& given_up) const
+                                                     const std::function<bool()>& given_up,
+                                                     const std::optional<Camera>& camera) const
 {
+  if (const std::string fault = camera ? camera->fault() : ""; !fault.empty())
+  {
+    throw std::invalid_argument("the camera: " + fault);
+  }
   const std::vector<BinaryFeature> features = detectBinaryFeatures(image.grey(), image.region(), params_.features);
   const auto candidates = static_cast<std::size_t>(params_.candidates);
   std::vector<ScoredView> likely;
@@ -251,15 +283,16 @@ std::vector<CandidateView> ViewRecognizer::recognize(const PreparedImage& image,
     view.name = candidate.name;
     view.score = candidate.score;
     const bool over = verified >= most || views.size() >= candidates || (given_up && given_up());
-    const std::shared_ptr<const PreparedImage> reference = verify && !over ? prepared(candidate.name) : nullptr;
+    const std::shared_ptr<const Prepared> reference = verify && !over ? prepared(candidate.name) : nullptr;
     if (reference)
     {
-      const ViewMatch match = matcher_.match(*reference, image, GeometryModel::FUNDAMENTAL, given_up);
+      const ViewMatch match = matcher_.match(reference->image, image, GeometryModel::FUNDAMENTAL, given_up);
       if (match.outcome == MatchOutcome::MATCHED)
       {
         view.verified = true;
         view.inliers = match.inliers;
         view.log_significance = match.log_significance;
+        view.pose = camera ? poseIn(reference->view, match, *camera) : std::nullopt;
         verified += 1;
       }
     }

@@ -2,6 +2,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "node_test.h"
 
+#include "support/room_structure.h"
 #include "view_servo/RecognizeView.h"
 #include "view_servo/RecognizedViews.h"
 #include "view_servo/ros/call_service.h"
@@ -95,6 +96,40 @@ TEST_F(ViewRecognizerNodeTest, NamesTheViewThatAnImageShows)
     EXPECT_GT(response.views[0].inliers, 20);
     EXPECT_NE(response.message.find(nameOf(i)), std::string::npos) << response.message;
     EXPECT_GT(response.elapsed_ms, 0.0);
+  }
+}
+
+TEST_F(ViewRecognizerNodeTest, TellsWhereTheCameraOfAnImageIsInAViewThatHasStructure)
+{
+  const RoomCorner room;
+  const StoredView view = roomView(room);
+  StoredView other = view;
+  other.name = "room_from_aside";
+  other.image = room.current;
+  test::saveView(NODE, view);
+  test::saveView(NODE, other);
+  ASSERT_TRUE(store().saveStructure(view.name, store().revision(view.name), roomStructure(4)));
+  RecognizeView::Request request;
+  request.image.view = other.name;
+  request.verify = true;
+  request.max_results = 2;
+  const RecognizeView::Response response = call(request);
+  store().remove(view.name);
+  store().remove(other.name);
+  ASSERT_EQ(response.views.size(), 2U) << response.message;
+  for (const RecognizedView& seen : response.views)
+  {
+    EXPECT_TRUE(seen.verified) << seen.view;
+    EXPECT_EQ(seen.has_pose != 0, seen.view == view.name) << seen.view;
+    if (seen.view == view.name)
+    {
+      const Eigen::Vector3d truth = roomViewFromCurrent().translation();
+      EXPECT_NEAR(seen.pose.pose.position.x, truth.x(), 0.02);
+      EXPECT_NEAR(seen.pose.pose.position.y, truth.y(), 0.02);
+      EXPECT_NEAR(seen.pose.pose.position.z, truth.z(), 0.02);
+      EXPECT_NEAR(seen.pose.pose.orientation.w, Eigen::Quaterniond(roomViewFromCurrent().linear()).w(), 0.001);
+      EXPECT_GT(seen.pose.covariance[0], 0.0);
+    }
   }
 }
 

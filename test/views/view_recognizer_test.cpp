@@ -2,6 +2,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "view_servo/views/view_recognizer.h"
 
+#include "support/room_structure.h"
 #include "support/temporary_directory.h"
 #include "support/text_file.h"
 #include "support/textured_plane.h"
@@ -12,12 +13,14 @@
 
 #include <cstdint>
 #include <filesystem>
+#include <optional>
 #include <stdexcept>
 #include <string>
 #include <vector>
 
 namespace
 {
+using view_servo::Camera;
 using view_servo::CandidateView;
 using view_servo::imageFiles;
 using view_servo::PreparedImage;
@@ -29,6 +32,11 @@ using view_servo::ViewStore;
 using view_servo::test::disturbed;
 using view_servo::test::exampleHomography;
 using view_servo::test::readText;
+using view_servo::test::roomCamera;
+using view_servo::test::RoomCorner;
+using view_servo::test::roomStructure;
+using view_servo::test::roomView;
+using view_servo::test::roomViewFromCurrent;
 using view_servo::test::TemporaryDirectory;
 using view_servo::test::texturedPicture;
 using view_servo::test::warpedPicture;
@@ -115,6 +123,26 @@ TEST_F(ViewRecognizerTest, VerifiesNoViewForAnUnknownScene)
   }
   const PreparedImage black(cv::Mat(240, 320, CV_8UC1, cv::Scalar(0)), cv::Rect(), recognizer.features());
   EXPECT_TRUE(recognizer.recognize(black, 3, true).empty());
+}
+
+TEST_F(ViewRecognizerTest, TellsWhereTheCameraIsOnceTheViewHasStructure)
+{
+  const RoomCorner room;
+  store_.save(roomView(room), false);
+  ViewRecognizer recognizer(storedViews(store_), params());
+  recognizer.update(ALL);
+  const PreparedImage image(room.current, cv::Rect(), recognizer.features());
+  const auto best = [&](const std::optional<Camera>& camera) {
+    return recognizer.recognize(image, 1, true, {}, camera).at(0);
+  };
+  EXPECT_TRUE(best(roomCamera()).verified);
+  EXPECT_FALSE(best(roomCamera()).pose) << "nothing has been learnt";
+  ASSERT_TRUE(store_.saveStructure("room", store_.revision("room"), roomStructure(4)));
+  EXPECT_FALSE(best(std::nullopt).pose) << "the camera is not known";
+  const CandidateView view = best(roomCamera());
+  ASSERT_TRUE(view.pose);
+  EXPECT_LT((view.pose->view_from_current.translation() - roomViewFromCurrent().translation()).norm(), 0.02);
+  EXPECT_THROW(best(Camera()), std::invalid_argument);
 }
 
 TEST_F(ViewRecognizerTest, GivesUpWhenAsked)

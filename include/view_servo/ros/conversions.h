@@ -9,10 +9,12 @@
 #include "view_servo/geometry/camera.h"
 #include "view_servo/geometry/line_segment.h"
 #include "view_servo/tracking/plane_tracker.h"
+#include "view_servo/views/structure_pose.h"
 #include "view_servo/views/view_match.h"
 #include "view_servo/views/view_store.h"
 
 #include <geometry_msgs/PoseStamped.h>
+#include <geometry_msgs/PoseWithCovariance.h>
 #include <geometry_msgs/Quaternion.h>
 #include <geometry_msgs/Transform.h>
 #include <geometry_msgs/TransformStamped.h>
@@ -84,6 +86,8 @@ sensor_msgs::RegionOfInterest toRegionOfInterest(const cv::Rect& rect);
 /** The pose in a transform that tf gives from the view's frame (source) to ViewPose::frame (target). */
 ViewPose toViewPose(const geometry_msgs::TransformStamped& transform);
 geometry_msgs::PoseStamped toPoseStamped(const ViewPose& pose, const ros::Time& stamp);
+/** Of StructurePose::view_from_current. */
+geometry_msgs::PoseWithCovariance toPoseWithCovariance(const StructurePose& pose);
 
 std::vector<PointMatch> toPointMatches(const std::vector<MatchedPoint>& matches);
 LineSegment toLineSegment(const Segment& segment);

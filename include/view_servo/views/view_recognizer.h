@@ -3,11 +3,14 @@
 #pragma once
 
 #include "view_servo/features/binary_features.h"
+#include "view_servo/geometry/camera.h"
 #include "view_servo/matching/view_index.h"
 #include "view_servo/parameters/parameter.h"
 #include "view_servo/views/prepared_image.h"
 #include "view_servo/views/scene_matcher.h"
+#include "view_servo/views/structure_pose.h"
 #include "view_servo/views/view_store.h"
+#include "view_servo/views/view_structure.h"
 
 #include <cstddef>
 #include <filesystem>
@@ -16,6 +19,7 @@
 #include <map>
 #include <memory>
 #include <mutex>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -39,7 +43,7 @@ std::vector<Parameter> recognitionParameters(ViewRecognizerParams& params);
 /** The same with those of the verification. */
 std::vector<Parameter> parameters(ViewRecognizerParams& params);
 
-/** Where a recognizer's views come from. Both functions may be called from several threads. */
+/** Where a recognizer's views come from. All functions may be called from several threads. */
 struct ViewSource
 {
   std::filesystem::path directory;  ///< where the views are, and the index is kept
@@ -47,6 +51,8 @@ struct ViewSource
   std::function<std::map<std::string, std::string>()> revisions;
   /** @throws std::runtime_error when the view cannot be read. */
   std::function<StoredView(const std::string& name)> load;
+  /** What has been learnt of a view. @throws std::runtime_error when it cannot be read. */
+  std::function<ViewStructure(const std::string& name)> structure;
 };
 
 /** The views of a store. */
@@ -63,6 +69,8 @@ struct CandidateView
   bool verified = false;          ///< the matcher found the scene of the view in the image
   int inliers = 0;                ///< matches that agree with what it found; 0 unless verified
   double log_significance = 0.0;  ///< as in ViewMatch; 0 unless verified
+  /** Where the camera is; empty unless verified, and where what has been learnt of the view does not tell it. */
+  std::optional<StructurePose> pose;
 };
 
 /**
@@ -106,9 +114,11 @@ public:
    * The most likely views: verified ones first, each kind with the largest score first.
    * @param verify whether to match the image with the candidates, until `most` are verified.
    * @param given_up asked now and then; once it is true, no further candidate is verified. May be empty.
+   * @param camera that took the image; without it poses are not known. @throws std::invalid_argument with its fault.
    */
   std::vector<CandidateView> recognize(const PreparedImage& image, std::size_t most, bool verify,
-                                       const std::function<bool()>& given_up = {}) const;
+                                       const std::function<bool()>& given_up = {},
+                                       const std::optional<Camera>& camera = std::nullopt) const;
 
   /** Where saveIndex() and loadIndex() keep the index: beside the views. */
   std::filesystem::path indexFile() const;
@@ -124,15 +134,20 @@ public:
   std::string loadIndex();
 
 private:
+  /** A view that may be matched again. */
   struct Prepared
   {
-    std::string name;
+    Prepared(StoredView&& stored, std::string stored_revision, const FeatureParams& features);
+
     std::string revision;
-    std::shared_ptr<const PreparedImage> image;
+    PreparedImage image;
+    StoredView view;  ///< without its image
   };
 
   std::string header() const;
-  std::shared_ptr<const PreparedImage> prepared(const std::string& name) const;
+  /** Null: it was removed meanwhile, or cannot be read. */
+  std::shared_ptr<const Prepared> prepared(const std::string& name) const;
+  std::optional<StructurePose> poseIn(const StoredView& view, const ViewMatch& match, const Camera& camera) const;
 
   ViewRecognizerParams params_;
   ViewSource source_;
@@ -141,9 +156,9 @@ private:
   std::mutex update_mutex_;   // one update at a time; taken before mutex_
   mutable std::mutex mutex_;  // guards what follows
   ViewIndex index_;
-  std::map<std::string, std::string> revisions_;   // of the views in the index
-  std::map<std::string, std::string> unreadable_;  // revisions of views that could not be read
-  mutable std::list<Prepared> prepared_;           // views verified last, used last first
+  std::map<std::string, std::string> revisions_;                 // of the views in the index
+  std::map<std::string, std::string> unreadable_;                // revisions of views that could not be read
+  mutable std::list<std::shared_ptr<const Prepared>> prepared_;  // views verified last, used last first
 };
 
 }  // namespace view_servo
