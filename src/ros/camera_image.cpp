@@ -76,7 +76,7 @@ void CameraImageSubscriber::subscribe(const ros::NodeHandle& nh, const ros::Node
 {
   image_transport::ImageTransport images(nh);
   const image_transport::TransportHints hints(transport, ros::TransportHints(), private_nh);
-  const std::string wanted = hints.getTransport();
+  const std::string& wanted = hints.getTransport();
   std::vector<std::string> names = installedTransports(images);
   const auto length = static_cast<std::uint32_t>(queue_size);
   if (contains(names, wanted))
