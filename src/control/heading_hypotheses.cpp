@@ -77,7 +77,7 @@ std::vector<Parameter> parameters(HeadingHypothesesParams& params)
          "part of its weight that a hypothesis keeps from one set of matches to the next"),
     integer("max_hypotheses", params.max_hypotheses, "", ">= 1", "hypotheses kept"),
     real("assumed_distance", params.assumed_distance, "m", "> 0", "distance of the view until it is known"),
-    natural("seed", params.seed, "of all random draws"),
+    natural("seed", params.seed, "seed of all random draws"),
   };
 }
 

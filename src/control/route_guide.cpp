@@ -23,14 +23,14 @@ std::vector<Parameter> parameters(RouteGuideParams& params)
 {
   return {
     real("handover_distance", params.handover_distance, "m", "> 0",
-         "as near to a view that is not the goal's, the base goes on to the next one"),
-    real("handover_turn", params.handover_turn, "rad", "> 0", "largest yaw error at that"),
+         "distance from a view that is not the goal's at which the base goes on to the next one"),
+    real("handover_turn", params.handover_turn, "rad", "> 0", "largest yaw error at which it then goes on"),
     real("handover_displacement", params.handover_displacement, "px", "> 0",
-         "it goes on, too, where the view's points are so near to their places, in the median, as the distance may not "
-         "be known in metres"),
+         "median distance of the view's points from their places at which it goes on, too, as the distance may not be "
+         "known in metres"),
     real("blind_distance", params.blind_distance, "m", ">= 0",
          "how far a holonomic base goes on by odometry until the next view is found; then it stands and waits"),
-    real("blind_turn", params.blind_turn, "rad", ">= 0", "how far it turns by odometry until then"),
+    real("blind_turn", params.blind_turn, "rad", ">= 0", "how far it turns by odometry until the next view is found"),
   };
 }
 

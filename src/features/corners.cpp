@@ -178,7 +178,7 @@ std::vector<Parameter> parameters(CornerParams& params)
     real("harris_k", params.k, "", "[0, 0.25)", "k in R = det(M) - k tr(M)^2"),
     real("corner_distance", params.min_distance, "px", "[0, 1000]", "smallest distance between corners"),
     real("corner_threshold", params.relative_threshold, "", "[0, 1)", "smallest response, as a part of the strongest"),
-    integer("corner_border", params.border, "px", ">= 1", "no corners closer to the image's border"),
+    integer("corner_border", params.border, "px", ">= 1", "no corner is closer to the image's border"),
   };
 }
 

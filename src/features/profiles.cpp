@@ -329,7 +329,7 @@ std::vector<Parameter> parameters(ProfileParams& params)
     integer("pair_neighbours", params.neighbours, "", ">= 1", "K_c: corners that each is paired with"),
     real("pair_radius", params.max_length, "px", "> profile_min_length", "D_c: longest profile"),
     real("profile_min_length", params.min_length, "px", ">= 2", "shortest profile"),
-    integer("coefficients", params.coefficients, "", "4, 6 or 8", "N_f: Fourier features a profile"),
+    integer("coefficients", params.coefficients, "", "4, 6 or 8", "N_f: Fourier features of each profile"),
     real("profile_contrast", params.min_contrast, "grey levels", "(0, 255)",
          "least deviation of a profile from its mean"),
   };

@@ -200,7 +200,8 @@ double vertex(float before, float middle, float after)
 std::vector<Parameter> parameters(GuidedParams& params)
 {
   return {
-    integer("patch_radius", params.patch_radius, "px", "[1, 50]", "patches compared by guided matching"),
+    integer("patch_radius", params.patch_radius, "px", "[1, 50]",
+            "radius of the patches that guided matching compares"),
     real("patch_correlation", params.min_correlation, "", "[0, 1)", "least correlation of the patches"),
   };
 }

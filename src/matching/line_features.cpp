@@ -55,9 +55,9 @@ std::vector<Parameter> parameters(LineFeatureParams& params)
         {
             integer("max_grouped", params.max_grouped, "", "[1, 5000]", "segments that form groups, the longest"),
             integer("neighbours", params.neighbours, "", "[6, 1000]",
-                    "nearest segments of each that judge a hypothesis"),
+                    "nearest neighbours of a segment, by which a hypothesis is judged"),
             integer("neighbour_pairs", params.neighbour_pairs, "", "[2, 100]",
-                    "nearest segments of each that make one"),
+                    "nearest neighbours of a segment, with which hypotheses are made"),
         } });
 }
 

@@ -497,17 +497,19 @@ std::vector<Parameter> parameters(LineRegionParams& params)
             "counterparts tried for a segment, those with most votes"),
     integer("max_trials", params.max_trials, "", ">= 1", "counterparts tried in all, first those that stand out most"),
     integer("max_companions", params.max_companions, "", ">= 2",
-            "matches of neighbours tried with it, those with most votes"),
+            "matches of neighbours tried with a counterpart, those with most votes"),
     integer("max_hypotheses", params.max_hypotheses, "", ">= 1", "affine maps tried for a counterpart"),
-    real("affine_tolerance", params.affine_tolerance, "px", "> 0", "of segments under a local affine map, across"),
-    real("region_tolerance", params.tolerance, "px", "> 0", "of segments under a region's homography, across"),
+    real("affine_tolerance", params.affine_tolerance, "px", "> 0",
+         "largest distance across of segments under a local affine map"),
+    real("region_tolerance", params.tolerance, "px", "> 0",
+         "largest distance across of segments under a region's homography"),
     real("region_max_angle_deg", params.max_angle_deg, "degrees", "(0, 45)",
          "largest angle between a mapped segment and its counterpart"),
     real("region_min_support", params.min_support, "", "> 0", "least sum of a region's matches, whole ones counting 1"),
     real("min_correlation", params.min_correlation, "", "[-1, 1)",
          "least correlation of what lies beside two segments, on the better side"),
     real("min_mean_correlation", params.min_mean_correlation, "", "[-1, 1)",
-         "least mean of it over a region's matches"),
+         "least mean of that correlation over a region's matches"),
   };
 }
 

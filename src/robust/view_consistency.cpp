@@ -116,8 +116,10 @@ double viewConstraint(const std::array<Correspondence, 5>& five)
 std::vector<Parameter> parameters(ViewConsistencyParams& params)
 {
   return {
-    real("consistency_threshold", params.threshold, "", "(0, 1]", "violation of a consistent group"),
-    real("consistency_increments", params.mean_increments, "", "> 0", "counts a candidate, on average"),
+    real("consistency_threshold", params.threshold, "", "(0, 1]",
+         "largest violation of the constraint by a consistent group"),
+    real("consistency_increments", params.mean_increments, "", "> 0",
+         "groups are drawn until a candidate was counted so often, on average"),
     integer("consistency_max_groups", params.max_groups, "", ">= 1", "groups of five drawn at most"),
   };
 }

@@ -115,11 +115,12 @@ std::vector<Parameter> parameters(ViewTrackerParams& params)
 {
   return {
     integer("max_landmarks", params.max_landmarks, "", ">= 8", "points of the view that are tracked"),
-    integer("tracking_window", params.window, "px", "odd, >= 5", "side of their patches"),
+    integer("tracking_window", params.window, "px", "odd, >= 5", "side of the patches around the points"),
     integer("tracking_levels", params.levels, "", "[0, 6]", "levels of the pyramid besides the image"),
     real("tracking_max_residual", params.max_residual, "px", "> 0", "largest error of a point that supports the pose"),
-    integer("tracking_min_supporting", params.min_supporting, "", ">= 4", "points that make a pose"),
-    real("tracking_min_support", params.min_support, "", "(0, 1]", "part of the points looked for that makes one"),
+    integer("tracking_min_supporting", params.min_supporting, "", ">= 4", "least number of points that support a pose"),
+    real("tracking_min_support", params.min_support, "", "(0, 1]",
+         "least part of the points looked for that has to support a pose"),
     real("tracking_max_scale_difference", params.max_scale_difference, "", "> 0",
          "largest difference between a point's change of size and the typical one"),
     real("assumed_depth", params.assumed_depth, "m", "> 0", "depth of the points when nothing is known"),

@@ -542,7 +542,7 @@ std::vector<Parameter> rowsOfLines(LineMatcherParams& params)
     boolean("refuse_mirrored", params.refuse_mirrored, "refuse an image that shows the view better when mirrored"),
     real("min_parallax", params.min_log_parallax, "", ">= 0",
          "-log10 of the false alarms a fundamental matrix may have off each plane"),
-    natural("seed", params.seed, "of all random draws"),
+    natural("seed", params.seed, "seed of all random draws"),
   };
 }
 

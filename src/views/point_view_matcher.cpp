@@ -594,7 +594,7 @@ std::vector<Parameter> parameters(PointViewMatcherParams& params)
                   "refuse an image that shows the view better when mirrored"),
           real("min_parallax", params.min_log_parallax, "", ">= 0",
                "-log10 of the false alarms a fundamental matrix may have off its best plane"),
-          natural("seed", params.seed, "of all random draws"),
+          natural("seed", params.seed, "seed of all random draws"),
       },
       parameters(params.ransac),
   });
