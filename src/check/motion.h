@@ -54,8 +54,9 @@ struct ImagePair
 SeenMotion seenByBase(const ImagePair& images, const CameraMount& mount, const PlanarPose& measured);
 
 /**
- * The motion of a camera in an arm's hand, by the homography of the plane that most matches lie on. Two motions explain a homography; the one nearer
- * to `measured` is taken. Where none is possible and a turn explains the matches, the camera has turned alone.
+ * The motion of a camera in an arm's hand, by the homography of the plane that most matches lie on. Two motions explain
+ * a homography; the one nearer to `measured` is taken. Where none is possible and a turn explains the matches, the
+ * camera has turned alone.
  */
 SeenMotion seenByHand(const ImagePair& images, const Motion& measured);
 

@@ -27,7 +27,10 @@ struct PictureMeasures
  */
 double edgeWidth(const cv::Mat& grey);
 
-/** Measures a picture; its corners and segments are those that the nodes find by their default parameters. @param grey 8-bit, one channel. */
+/**
+ * Measures a picture; its corners and segments are those that the nodes find by their default parameters. @param grey
+ * 8-bit, one channel.
+ */
 PictureMeasures measurePicture(const cv::Mat& grey);
 
 /** The picture, BGR, with its corners as dots and its segments as lines, and a line of text below. */

@@ -22,8 +22,8 @@ namespace view_servo
 struct PointPair
 {
   std::string name;
-  cv::Mat reference;  ///< 8-bit grey
-  cv::Mat current;    ///< likewise
+  cv::Mat reference;                                   ///< 8-bit grey
+  cv::Mat current;                                     ///< likewise
   GeometryModel model;                                 ///< what relates the two images
   std::function<double(const Correspondence&)> error;  ///< of a match [px]; NaN where the point can have no match
   Correspondences points;                              ///< true matches, at which an estimated geometry is measured

@@ -20,8 +20,8 @@ struct ErrorModel
 };
 
 /**
- * Minimises the sum of squared whitened errors of the poses `used`, from `state`. @param whitening of all poses, ROWS x ROWS, so that whitened errors have a
- * covariance of identity times some factor.
+ * Minimises the sum of squared whitened errors of the poses `used`, from `state`. @param whitening of all poses, ROWS x
+ * ROWS, so that whitened errors have a covariance of identity times some factor.
  */
 void fit(const Problem& problem, const Indices& used, const std::vector<Eigen::MatrixXd>& whitening, State& state);
 

@@ -37,7 +37,10 @@ inline Eigen::Isometry3d parseStart(const sim::World& world, const std::string& 
   return sim::planarPose(x, y, yaw);
 }
 
-/** The pose on the floor of a camera, whose x axis is the camera's optical axis seen from above. @param camera world from camera. */
+/**
+ * The pose on the floor of a camera, whose x axis is the camera's optical axis seen from above. @param camera world
+ * from camera.
+ */
 inline PlanarPose onFloor(const Eigen::Isometry3d& camera)
 {
   const Eigen::Vector3d axis = camera.linear().col(2);

@@ -78,7 +78,10 @@ public:
   void list(const std::string& name, std::vector<std::string>& values, const std::string& description,
             char separator = '\0');
 
-  /** An option whose value is a number within `range`. @tparam Number double, int, std::uint64_t, or std::optional of one, which has no default. */
+  /**
+   * An option whose value is a number within `range`. @tparam Number double, int, std::uint64_t, or std::optional of
+   * one, which has no default.
+   */
   template <typename Number>
   void number(const std::string& name, Number& value, const NumberRange& range, const std::string& description);
 

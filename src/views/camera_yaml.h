@@ -33,7 +33,10 @@ void fromList(const YAML::Node& node, Matrix& matrix)
   }
 }
 
-/** A camera from yaml as stored views and printed sensor_msgs/CameraInfo have it: width, height, K and so on. @throws what yaml-cpp and fromList() throw. */
+/**
+ * A camera from yaml as stored views and printed sensor_msgs/CameraInfo have it: width, height, K and so on. @throws
+ * what yaml-cpp and fromList() throw.
+ */
 inline Camera cameraFromYaml(const YAML::Node& node)
 {
   Camera camera;

@@ -28,15 +28,11 @@ protected:
   {
   }
 
-  void SetUp() override
+  void prepare() override
   {
-    waitForRobot();
-    ASSERT_FALSE(HasFatalFailure());
     SetPose place;
     place.request.pose = toPose(planarPose(-0.906, 0.423, 0.0));
     ASSERT_TRUE(callService("nomad_sim/set_pose", place) && place.response.success) << place.response.message;
-    ASSERT_TRUE(waitUntil([&] { return speed() == 0.0; }));
-    waitForFreshTruth();
   }
 
   double speedOf(const nav_msgs::Odometry& state) const override

@@ -27,13 +27,9 @@ protected:
   {
   }
 
-  void SetUp() override
+  void prepare() override
   {
-    waitForRobot();
-    ASSERT_FALSE(HasFatalFailure());
     ASSERT_TRUE(waitUntil([&] { return tf_.canTransform(BASE_FRAME, CAMERA_FRAME, ros::Time(0)); }));
-    ASSERT_TRUE(waitUntil([&] { return speed() == 0.0; }));
-    waitForFreshTruth();
   }
 
   double speedOf(const sensor_msgs::JointState& joints) const override

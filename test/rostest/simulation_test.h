@@ -32,6 +32,20 @@ protected:
   {
   }
 
+  /** Each test begins with the robot ready and at rest, and with messages that say so. */
+  void SetUp() final
+  {
+    waitForRobot();
+    ASSERT_FALSE(HasFatalFailure());
+    prepare();
+    ASSERT_FALSE(HasFatalFailure());
+    ASSERT_TRUE(test::waitUntil([&] { return speed() == 0.0; }));
+    waitForFreshTruth();
+  }
+
+  /** What a test needs besides, once the robot is there: places it, or waits for more of its messages. */
+  virtual void prepare() = 0;
+
   /** How fast the robot is by its state; 0 only when all of it stands. */
   virtual double speedOf(const State& state) const = 0;
 

@@ -10,9 +10,9 @@ namespace view_servo
 {
 /**
  * How far the stamps of odometry and images are apart, from the turns of a base: what the images say of them has to be
- * what odometry says, at another time. Only turns that begin, end or change show the offset; a turn of constant
- * speed looks the same at all times. Where the begin of a turn is not seen, odometry that turns 5 % too much looks as if it were 50 ms late.
- * Times are those of the messages [s], angles are [rad].
+ * what odometry says, at another time. Only turns that begin, end or change show the offset; a turn of constant speed
+ * looks the same at all times. Where the begin of a turn is not seen, odometry that turns 5 % too much looks as if it
+ * were 50 ms late. Times are those of the messages [s], angles are [rad].
  */
 class ClockOffset
 {

@@ -93,7 +93,10 @@ std::vector<PointMatch> toPointMatches(const std::vector<MatchedPoint>& matches)
 LineSegment toLineSegment(const Segment& segment);
 std::vector<LineMatch> toLineMatches(const std::vector<MatchedLine>& lines);
 
-/** Writes a matrix row by row into an array of nine numbers; arrays in messages are boost::array in some ROS releases and std::array in others. */
+/**
+ * Writes a matrix row by row into an array of nine numbers; arrays in messages are boost::array in some ROS releases
+ * and std::array in others.
+ */
 template <typename Array>
 void copyRowMajor(const Eigen::Matrix3d& matrix, Array& array)
 {

@@ -29,8 +29,9 @@ struct LiveNumber
 };
 
 /**
- * The named rows of a table as numbers that may be changed. Each is allowed from `least` up to the value that it has now, so
- * that what the node was started with is the limit. @throws std::invalid_argument for a name that is not one of the table's numbers.
+ * The named rows of a table as numbers that may be changed. Each is allowed from `least` up to the value that it has
+ * now, so that what the node was started with is the limit. @throws std::invalid_argument for a name that is not one of
+ * the table's numbers.
  */
 std::vector<LiveNumber> upToNow(const std::vector<Parameter>& table, const std::vector<std::string>& names,
                                 double least);
