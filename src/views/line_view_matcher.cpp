@@ -36,7 +36,7 @@ constexpr double NOT_A_NUMBER = std::numeric_limits<double>::quiet_NaN();
 constexpr double BEYOND_CHANCE = 7.0;
 // Symmetric things in a mirrored image, as a chessboard, have matched with this significance.
 constexpr double BEYOND_MIRRORS = 120.0;
-constexpr double DOUBTFUL = 100.0;  // a significance that calls for more care with that
+constexpr double DOUBTFUL = 25.0;  // a significance that calls for more care with that
 
 /** How sure a match is: the mean of what the segments share and of how alike their surroundings look. */
 double quality(const SegmentMatch& match)
