@@ -67,12 +67,6 @@ std::vector<RecognizedView> toMessages(const std::vector<CandidateView>& views)
   return messages;
 }
 
-/** Empty for a camera that cannot be used: views are recognized without poses then. */
-std::optional<Camera> usable(const std::optional<Camera>& camera)
-{
-  return camera && camera->fault().empty() ? camera : std::nullopt;
-}
-
 /** What was found, in one line. @param indexed number of views among which the image was looked for. */
 std::string describe(const std::vector<CandidateView>& views, std::size_t indexed, bool verified)
 {
@@ -155,7 +149,7 @@ private:
     const PreparedImage image(source.grey, source.region, recognizer_.features());
     const auto most = static_cast<std::size_t>(std::max(1, request.max_results));
     const std::vector<CandidateView> views =
-        recognizer_.recognize(image, most, request.verify, given_up_, usable(source.camera));
+        recognizer_.recognize(image, most, request.verify, given_up_, source.camera);
     response.elapsed_ms = std::chrono::duration<double, std::milli>(Clock::now() - begin).count();
     response.success = !views.empty() && (views.front().verified || !request.verify);
     response.message = describe(views, recognizer_.size(), request.verify) + behind;
@@ -185,7 +179,7 @@ private:
   {
     const PreparedImage image(toGrey(*frame.image), cv::Rect(), recognizer_.features());
     const std::vector<CandidateView> views =
-        recognizer_.recognize(image, 1, true, given_up_, usable(toCamera(*frame.info)));
+        recognizer_.recognize(image, 1, true, given_up_, toCamera(*frame.info));
     if (given_up_())
     {
       return;

@@ -264,10 +264,7 @@ std::vector<CandidateView> ViewRecognizer::recognize(const PreparedImage& image,
                                                      const std::function<bool()>& given_up,
                                                      const std::optional<Camera>& camera) const
 {
-  if (const std::string fault = camera ? camera->fault() : ""; !fault.empty())
-  {
-    throw std::invalid_argument("the camera: " + fault);
-  }
+  const bool is_calibrated = camera && camera->fault().empty();
   const std::vector<BinaryFeature> features = detectBinaryFeatures(image.grey(), image.region(), params_.features);
   const auto candidates = static_cast<std::size_t>(params_.candidates);
   std::vector<ScoredView> likely;
@@ -292,7 +289,7 @@ std::vector<CandidateView> ViewRecognizer::recognize(const PreparedImage& image,
         view.verified = true;
         view.inliers = match.inliers;
         view.log_significance = match.log_significance;
-        view.pose = camera ? poseIn(reference->view, match, *camera) : std::nullopt;
+        view.pose = is_calibrated ? poseIn(reference->view, match, *camera) : std::nullopt;
         verified += 1;
       }
     }

@@ -114,7 +114,7 @@ public:
    * The most likely views: verified ones first, each kind with the largest score first.
    * @param verify whether to match the image with the candidates, until `most` are verified.
    * @param given_up asked now and then; once it is true, no further candidate is verified. May be empty.
-   * @param camera that took the image; without it poses are not known. @throws std::invalid_argument with its fault.
+   * @param camera that took the image; without it, or where it has a fault, poses are not known.
    */
   std::vector<CandidateView> recognize(const PreparedImage& image, std::size_t most, bool verify,
                                        const std::function<bool()>& given_up = {},
