@@ -148,6 +148,7 @@ public:
     }
     std::sort(ranked.begin(), ranked.end());
     std::vector<std::string> names;
+    names.reserve(ranked.size());
     for (const auto& [score, name] : ranked)
     {
       names.push_back(name);
@@ -239,7 +240,9 @@ double shareSeen(const IndoorWalk& walk, const Eigen::Isometry3d& reference, con
   int all = 0;
   for (int i = 0; i < ROWS * COLUMNS; ++i)
   {
-    const Eigen::Vector2d at((i % COLUMNS + 0.5) * size.width / COLUMNS, (i / COLUMNS + 0.5) * size.height / ROWS);
+    const int column = i % COLUMNS;
+    const int row = i / COLUMNS;
+    const Eigen::Vector2d at((column + 0.5) * size.width / COLUMNS, (row + 0.5) * size.height / ROWS);
     for (const double depth : { 2.0, 3.0, 4.5 })
     {
       const Eigen::Vector3d point = current_from_reference * (depth * (walk.camera.k.inverse() * at.homogeneous()));
