@@ -30,11 +30,11 @@ constexpr char INDEX_FILE[] = "views.index";
 
 bool isImageFile(const fs::path& file)
 {
-  static const std::set<std::string> ENDINGS{ ".bmp", ".jpeg", ".jpg", ".pgm", ".png", ".ppm", ".tif", ".tiff" };
+  static const std::set<std::string> endings{ ".bmp", ".jpeg", ".jpg", ".pgm", ".png", ".ppm", ".tif", ".tiff" };
   std::string ending = file.extension().string();
   std::transform(ending.begin(), ending.end(), ending.begin(),
                  [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
-  return ENDINGS.count(ending) != 0;
+  return endings.count(ending) != 0;
 }
 
 /** Changes whenever the file is written. */
