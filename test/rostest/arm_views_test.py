@@ -13,15 +13,16 @@ import unittest
 ROOT = os.path.realpath(os.path.join(os.path.dirname(os.path.abspath(__file__)), "..", ".."))
 sys.path.insert(0, os.path.join(ROOT, "test", "docs"))
 sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))
+import arm_graph  # noqa: E402
 import graph  # noqa: E402
 from arm_poses import looking_at_the_box  # noqa: E402
 
 import actionlib  # noqa: E402
 import numpy  # noqa: E402
 import rospy  # noqa: E402
-from geometry_msgs.msg import PoseStamped, TwistStamped  # noqa: E402
+from geometry_msgs.msg import TwistStamped  # noqa: E402
 from std_msgs.msg import Bool  # noqa: E402
-from view_servo.msg import ServoToViewAction, ServoToViewGoal, ServoView  # noqa: E402
+from view_servo.msg import ServoToViewGoal, ServoView  # noqa: E402
 
 # Of the camera in the world [m], and its turn about its own axis [degrees].
 START = (0.38, -0.12, 0.84, -12)
@@ -32,35 +33,16 @@ REGIONS = {"approach": "195 65 255 360", "grasp": "172 31 296 418"}
 REST = 2.0e-3  # from a view where the arm has converged [m]
 
 
-class ArmViews(graph.GraphTest):
+class ArmViews(arm_graph.ArmTest):
     @classmethod
     def setUpClass(cls):
         super().setUpClass()
         cls.lock = threading.Lock()
-        cls.place, cls.commands, cls.feedback = None, [], []
-        cls.subscribers = [rospy.Subscriber("/ground_truth", PoseStamped, cls.take_truth),
-                           rospy.Subscriber("/cmd_vel", TwistStamped, cls.take_command)]
+        cls.commands, cls.feedback = [], []
         cls.stop = rospy.Publisher("/stop", Bool, queue_size=1, latch=True)
-        cls.graph.start("roslaunch", "view_servo", "puma_sim.launch", "world:=rice")
-        cls.graph.start("roslaunch", "view_servo", "arm_servo.launch", "sim:=false")
-        cls.client = actionlib.SimpleActionClient("/servo", ServoToViewAction)
-        graph.wait_until("all nodes", lambda: cls.place is not None and all(
-            service in cls.graph.state()[2]
-            for service in ("/puma_sim/set_pose", "/view_store/save", "/servo_25d/enable", "/homography_tracker/start")))
-        graph.wait_until("the action", lambda: cls.client.wait_for_server(rospy.Duration(0.1)))
+        cls.start_arm([rospy.Subscriber("/cmd_vel", TwistStamped, cls.take_command)])
         status, text = cls.graph.run("rosservice call /servo_25d/enable true")
         assert status == 0, text
-
-    @classmethod
-    def tearDownClass(cls):
-        for subscriber in cls.subscribers:
-            subscriber.unregister()
-        super().tearDownClass()
-
-    @classmethod
-    def take_truth(cls, message):
-        place = message.pose.position
-        cls.place = numpy.array([place.x, place.y, place.z])
 
     @classmethod
     def take_command(cls, message):

@@ -17,17 +17,17 @@ import xml.etree.ElementTree
 ROOT = os.path.realpath(os.path.join(os.path.dirname(os.path.abspath(__file__)), "..", ".."))
 sys.path.insert(0, os.path.join(ROOT, "test", "docs"))
 sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))
+import arm_graph  # noqa: E402
 import documents  # noqa: E402
 import graph  # noqa: E402
 from arm_poses import looking_at_the_box  # noqa: E402
 
-import actionlib  # noqa: E402
 import numpy  # noqa: E402
 import rospy  # noqa: E402
 import yaml  # noqa: E402
-from geometry_msgs.msg import PoseStamped, TwistStamped  # noqa: E402
+from geometry_msgs.msg import TwistStamped  # noqa: E402
 from sensor_msgs.msg import JointState  # noqa: E402
-from view_servo.msg import ServoError, ServoToViewAction, ServoToViewGoal  # noqa: E402
+from view_servo.msg import ServoError, ServoToViewGoal  # noqa: E402
 
 START = (0.42, 0.10, 0.80, 25)  # of the camera in the world [m], and its turn about its own axis [degrees]
 GOAL = (0.50, 0.00, 0.74, 0)
@@ -149,7 +149,7 @@ class Consumer:
         return message
 
 
-class MoveitServo(graph.GraphTest):
+class MoveitServo(arm_graph.ArmTest):
     @classmethod
     def setUpClass(cls):
         super().setUpClass()
@@ -157,32 +157,13 @@ class MoveitServo(graph.GraphTest):
             cls.robot = Robot(file.read())
         cls.settings = documented_settings()
         cls.lock = threading.Lock()
-        cls.place, cls.points = None, []
-        cls.subscribers = [rospy.Subscriber("/ground_truth", PoseStamped, cls.take_truth),
-                           rospy.Subscriber("/servo_error", ServoError, cls.take_error)]
-        cls.graph.start("roslaunch", "view_servo", "puma_sim.launch", "world:=rice")
-        cls.graph.start("roslaunch", "view_servo", "arm_servo.launch", "sim:=false",
-                        "cmd_vel:=/servo_server/" + cls.settings["cartesian_command_in_topic"])
-        cls.client = actionlib.SimpleActionClient("/servo", ServoToViewAction)
-        graph.wait_until("all nodes", lambda: cls.place is not None and all(
-            service in cls.graph.state()[2]
-            for service in ("/puma_sim/set_pose", "/view_store/save", "/servo_25d/enable", "/homography_tracker/start")))
-        graph.wait_until("the action", lambda: cls.client.wait_for_server(rospy.Duration(0.1)))
+        cls.points = []
+        cls.start_arm([rospy.Subscriber("/servo_error", ServoError, cls.take_error)],
+                      "cmd_vel:=/servo_server/" + cls.settings["cartesian_command_in_topic"])
         cls.put(GOAL)
         for command in ("rosrun view_servo view save shelf --roi 172 31 296 418", "rosservice call /servo_25d/enable true"):
             status, text = cls.graph.run(command)
             assert status == 0, text
-
-    @classmethod
-    def tearDownClass(cls):
-        for subscriber in cls.subscribers:
-            subscriber.unregister()
-        super().tearDownClass()
-
-    @classmethod
-    def take_truth(cls, message):
-        place = message.pose.position
-        cls.place = numpy.array([place.x, place.y, place.z])
 
     @classmethod
     def take_error(cls, message):
