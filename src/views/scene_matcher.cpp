@@ -289,7 +289,7 @@ private:
 
   /**
    * Corners off the planes that are seen not far from where one would show them: they say most of the parallax. Each has
-   * to be found again from the current image, where something else looks more like it, it is not.
+   * to be found again from the current image, which fails where something else there looks more like it.
    */
   void addMatchesNear(const Eigen::Matrix3d& h)
   {
