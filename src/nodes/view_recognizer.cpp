@@ -178,8 +178,7 @@ private:
   void recognizeFrame(const CameraFrame& frame)
   {
     const PreparedImage image(toGrey(*frame.image), cv::Rect(), recognizer_.features());
-    const std::vector<CandidateView> views =
-        recognizer_.recognize(image, 1, true, given_up_, toCamera(*frame.info));
+    const std::vector<CandidateView> views = recognizer_.recognize(image, 1, true, given_up_, toCamera(*frame.info));
     if (given_up_())
     {
       return;
