@@ -10,11 +10,16 @@ import signal
 import socket
 import subprocess
 import tempfile
+import threading
 import time
 import unittest
 import xmlrpc.client
 
 import rospy
+
+# Debian 11's rospy asks threads by a name that its Python no longer knows.
+if not hasattr(threading.Thread, "isAlive"):
+    threading.Thread.isAlive = threading.Thread.is_alive
 
 CALLER = "/documents"
 SLOWDOWN = float(os.environ.get("VIEW_SERVO_SLOWDOWN", "1"))  # of what is built with sanitizers
