@@ -4,6 +4,7 @@
 
 #include "experiments/input_file.h"
 #include "view_servo/geometry/rotation_vector.h"
+#include "view_servo/parameters/yaml_text.h"
 
 #include <yaml-cpp/yaml.h>
 #include <opencv2/calib3d.hpp>
@@ -11,6 +12,7 @@
 #include <opencv2/core/eigen.hpp>
 
 #include <algorithm>
+#include <exception>
 #include <fstream>
 #include <iterator>
 #include <sstream>
@@ -49,13 +51,13 @@ Eigen::Isometry3d readPose(const fs::path& file)
   Eigen::Matrix<double, 6, 1> values;
   try
   {
-    const YAML::Node data = YAML::LoadFile(file.string())["data"];
+    const YAML::Node data = loadSmallYamlFile(file.string())["data"];
     for (int i = 0; i < 6; ++i)
     {
       values(i) = data[i][0].as<double>();
     }
   }
-  catch (const YAML::Exception& error)
+  catch (const std::exception& error)
   {
     throw std::runtime_error("cannot read " + file.string() + ": " + error.what());
   }

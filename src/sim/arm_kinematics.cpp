@@ -21,6 +21,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
+#include <mutex>
 #include <utility>
 
 namespace view_servo::sim
@@ -34,7 +35,10 @@ constexpr int JOINTS = ArmKinematics::JOINTS;
 constexpr double NO_MOTION = 1e-9;      // joint velocity, as part of the fastest joint's, that is rounding
 constexpr double POSE_ACCURACY = 1e-6;  // of inverse kinematics [m, rad]
 
-/** Gathers what urdfdom has to say about a faulty URDF, which it otherwise only prints. */
+/**
+ * Gathers what urdfdom has to say about a faulty URDF, which it otherwise only prints. One at a time: whom console_bridge
+ * tells is one for all threads.
+ */
 class ParserErrors : public console_bridge::OutputHandler
 {
 public:
@@ -65,6 +69,8 @@ urdf::ModelInterfaceSharedPtr parsed(const std::string& urdf_xml)
   urdf::ModelInterfaceSharedPtr model;
   std::vector<std::string> faults;
   {
+    static std::mutex one_at_a_time;
+    const std::lock_guard<std::mutex> lock(one_at_a_time);
     ParserErrors parser;
     model = urdf::parseURDF(urdf_xml);
     faults = parser.errors;

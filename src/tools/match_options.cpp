@@ -53,11 +53,10 @@ std::vector<std::string> namesOf(const Map& map)
 
 /**
  * The two words that a subcommand takes. What follows them belongs to --set, where it was given.
- * @param none what to say when there is no word. @param which what the two words are.
+ * @param none what to say when there is no word.
  */
 std::pair<std::string, std::string> takeTwoWords(const std::vector<std::string>& words,
-                                                 std::vector<std::string>& settings, const std::string& none,
-                                                 const std::string& which)
+                                                 std::vector<std::string>& settings, const std::string& none)
 {
   if (words.size() < 2)
   {
@@ -65,7 +64,7 @@ std::pair<std::string, std::string> takeTwoWords(const std::vector<std::string>&
   }
   if (words.size() > 2 && settings.empty())
   {
-    throw std::runtime_error("'" + words[2] + "' is one word too many: " + which);
+    throw std::runtime_error("'" + words[2] + "' is one word too many after '" + words[0] + "' and '" + words[1] + "'");
   }
   settings.insert(settings.end(), words.begin() + 2, words.end());
   return { words[0], words[1] };
@@ -128,7 +127,7 @@ std::optional<MatchOptions> readMatchOptions(MatchSubcommand subcommand, int arg
     return std::nullopt;
   }
   std::tie(options.reference, options.current) =
-      takeTwoWords(*words, options.settings, "REF and CUR, the two images, are missing", "REF and CUR are two images");
+      takeTwoWords(*words, options.settings, "REF and CUR, the two images, are missing");
   return options;
 }
 
@@ -152,8 +151,7 @@ std::optional<FindOptions> readFindOptions(int argc, const char* const* argv)
     return std::nullopt;
   }
   std::tie(options.directory, options.current) =
-      takeTwoWords(*words, options.settings, "DIR, a folder of views, and CUR, the current image, are missing",
-                   "DIR is a folder and CUR an image");
+      takeTwoWords(*words, options.settings, "DIR, a folder of views, and CUR, the current image, are missing");
   return options;
 }
 

@@ -3,8 +3,10 @@
 #include "view_servo/views/camera_file.h"
 
 #include "camera_yaml.h"
-#include "small_yaml_file.h"
 #include "view_servo/parameters/error_text.h"
+#include "view_servo/parameters/yaml_text.h"
+
+#include <yaml-cpp/yaml.h>
 
 #include <exception>
 #include <stdexcept>

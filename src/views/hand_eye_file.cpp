@@ -2,8 +2,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "view_servo/views/hand_eye_file.h"
 
-#include "small_yaml_file.h"
 #include "view_servo/parameters/error_text.h"
+#include "view_servo/parameters/yaml_text.h"
 
 #include <yaml-cpp/yaml.h>
 

@@ -5,6 +5,7 @@
 #include "camera_yaml.h"
 #include "stored_files.h"
 #include "view_servo/parameters/error_text.h"
+#include "view_servo/parameters/yaml_text.h"
 
 #include <yaml-cpp/yaml.h>
 
@@ -119,7 +120,7 @@ std::optional<Route> read(const fs::path& directory, const std::string& name)
   {
     return std::nullopt;
   }
-  const YAML::Node node = YAML::Load(withoutChecksum(*text, "its yaml file"));
+  const YAML::Node node = parseYaml(withoutChecksum(*text, "its yaml file"));
   if (const int format = node["format"].as<int>(); format != FORMAT)
   {
     throw Damage("it has format " + std::to_string(format) + ", not " + std::to_string(FORMAT));

@@ -6,6 +6,7 @@
 #include "stored_files.h"
 #include "view_servo/images/image_io.h"
 #include "view_servo/parameters/error_text.h"
+#include "view_servo/parameters/yaml_text.h"
 
 #include <yaml-cpp/yaml.h>
 #include <opencv2/imgcodecs.hpp>
@@ -226,7 +227,7 @@ std::string toYamlText(const StoredView& view, const std::string& image_file)
 /** @throws Damage when the text is not, to the byte, what toYamlText() wrote. */
 YAML::Node parseYaml(const std::string& text)
 {
-  const YAML::Node node = YAML::Load(withoutChecksum(text, "its yaml file"));
+  const YAML::Node node = parseYaml(withoutChecksum(text, "its yaml file"));
   if (const int format = node["format"].as<int>(); format != FORMAT)
   {
     throw Damage("it has format " + std::to_string(format) + ", not " + std::to_string(FORMAT));

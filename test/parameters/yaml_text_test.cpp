@@ -1,0 +1,47 @@
+// Copyright (c) 2026, the view_servo authors
+// SPDX-License-Identifier: BSD-3-Clause
+#include "view_servo/parameters/yaml_text.h"
+#include "support/temporary_directory.h"
+#include "support/text_file.h"
+
+#include <gtest/gtest.h>
+#include <yaml-cpp/yaml.h>
+
+#include <exception>
+#include <string>
+
+namespace view_servo
+{
+namespace
+{
+TEST(YamlText, IsRead)
+{
+  EXPECT_EQ(parseYaml("{a: {b: 1}, c: [2, 3]}")["c"][1].as<int>(), 3);
+  EXPECT_EQ(parseYaml("a: 1\n\n")["a"].as<int>(), 1);
+  EXPECT_TRUE(parseYaml("").IsNull());
+}
+
+TEST(YamlText, IsRefusedWhereItEndsTooEarly)
+{
+  for (const char* text : { "a: {b:", "{name: rice, position:", "- [a:", "[a:", "a: [ {b:", "{a: b:", "{:", "{? a:",
+                            "{", "[", "a: [1, 2", "a: {b: \"", "a: {b: 'c" })
+  {
+    EXPECT_THROW(parseYaml(text), YAML::Exception) << text;
+  }
+}
+
+TEST(YamlText, IsRefusedInAFileThatEndsTooEarlyOrIsTooLarge)
+{
+  const test::TemporaryDirectory directory;
+  const std::string file = (directory.path() / "cut.yaml").string();
+  test::writeText(file, "{name: rice, position:");
+  EXPECT_THROW(loadSmallYamlFile(file), YAML::Exception);
+  test::writeText(file, "a: 1 #" + std::string(1000000, '#'));
+  EXPECT_THROW(loadSmallYamlFile(file), std::exception);
+  EXPECT_THROW(loadSmallYamlFile(directory.path().string()), std::exception);
+  test::writeText(file, "a: 1");
+  EXPECT_EQ(loadSmallYamlFile(file)["a"].as<int>(), 1);
+}
+
+}  // namespace
+}  // namespace view_servo
