@@ -69,7 +69,7 @@ inline std::vector<Parameter> parameters(SimulationParams& params)
          "rate at which the robot moves and publishes its state"),
     text("frame_prefix", params.frame_prefix,
          "put before the names of the robot's frames, with a slash between, so that several robots share one /tf; "
-         "robot_state_publisher calls it tf_prefix"),
+         "its launch file tells robot_state_publisher, too"),
   };
 }
 
