@@ -225,7 +225,7 @@ std::string toYamlText(const StoredView& view, const std::string& image_file)
 }
 
 /** @throws Damage when the text is not, to the byte, what toYamlText() wrote. */
-YAML::Node parseYaml(const std::string& text)
+YAML::Node parseViewYaml(const std::string& text)
 {
   const YAML::Node node = parseYaml(withoutChecksum(text, "its yaml file"));
   if (const int format = node["format"].as<int>(); format != FORMAT)
@@ -261,7 +261,7 @@ std::optional<StoredView> readView(const fs::path& directory, const std::string&
   std::optional<std::string> text = readFile(yamlPath(directory, name));
   while (text)
   {
-    const YAML::Node node = parseYaml(*text);
+    const YAML::Node node = parseViewYaml(*text);
     const auto image_file = node["image"].as<std::string>();
     if (std::optional<std::string> png = readFile(directory / image_file))
     {
@@ -409,7 +409,7 @@ std::string ViewStore::revision(const std::string& name) const
   {
     if (const std::optional<std::string> text = readFile(yamlPath(directory_, name)))
     {
-      parseYaml(*text);
+      parseViewYaml(*text);
       return checksum(*text);
     }
   }
