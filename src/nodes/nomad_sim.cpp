@@ -3,6 +3,7 @@
 #include "sim_ros/nomad_robot.h"
 #include "sim_ros/simulation_node.h"
 
+#include <geometry_msgs/TransformStamped.h>
 #include <geometry_msgs/Twist.h>
 #include <nav_msgs/Odometry.h>
 #include <ros/publisher.h>
@@ -13,6 +14,7 @@
 #include <optional>
 #include <string>
 #include <utility>
+#include <vector>
 
 namespace view_servo::sim
 {
@@ -21,31 +23,38 @@ namespace
 /**
  * What SimulationNode needs to know of the base.
  *
- * Parameters: see NomadParams.
+ * Parameters: see NomadNodeParams.
  *
  * Subscribes:
  *  - `cmd_vel` (geometry_msgs/Twist): linear.x, linear.y and angular.z, in base_link.
  *
  * Publishes:
- *  - `odom` (nav_msgs/Odometry), `/tf` odom -> base_link, `/tf_static` base_link -> camera_optical_frame.
+ *  - `odom` (nav_msgs/Odometry), `/tf` odom -> base_link, `/tf_static` base_link -> camera_optical_frame; with
+ *    `~footprint_frame` odometry and `/tf` are of that one, and `/tf_static` has it -> base_link.
  */
 class NomadInterface
 {
 public:
   using Robot = NomadRobot;
-  using Params = NomadParams;
+  using Params = NomadNodeParams;
   using Command = geometry_msgs::Twist;
   static constexpr RobotKind KIND = RobotKind::NOMAD;
 
   static std::unique_ptr<NomadRobot> makeRobot(const World& world, const Params& params, const ros::NodeHandle& /*nh*/)
   {
-    return std::make_unique<NomadRobot>(world, params);
+    return std::make_unique<NomadRobot>(world, params, params.frames);
   }
 
   NomadInterface(const NomadRobot& robot, FrameNames frames, ros::NodeHandle& nh)
     : frames_(std::move(frames)), odometry_publisher_(nh.advertise<nav_msgs::Odometry>("odom", 50))
   {
-    static_broadcaster_.sendTransform(frames_(*robot.cameraMount(ros::Time::now())));
+    const ros::Time now = ros::Time::now();
+    std::vector<geometry_msgs::TransformStamped> mounts = { frames_(*robot.cameraMount(now)) };
+    if (const auto footprint = robot.footprintMount(now))
+    {
+      mounts.push_back(frames_(*footprint));
+    }
+    static_broadcaster_.sendTransform(mounts);
   }
 
   static std::optional<Robot::Twist> toTwist(const Command& message)

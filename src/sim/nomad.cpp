@@ -53,6 +53,10 @@ std::vector<Parameter> parameters(NomadParams& params)
     real("odometry_turn_drift", params.odometry_turn_drift, "rad/m", "", "turn that odometry adds to a distance"),
     real("odometry_noise", params.odometry_noise, "", ">= 0",
          "standard deviation of the measured motion, as a part of it"),
+    real("slip_share", params.slip_share, "", "[0, 1)",
+         "share of the time in which its wheels slip, for short spells at random: odometry does not notice it"),
+    real("slip_loss", params.slip_loss, "", "[0, 1]", "part of the motion that is lost while the wheels slip"),
+    real("slip_duration", params.slip_duration, "s", "> 0", "of such a spell, in the mean"),
   };
 }
 
@@ -65,6 +69,7 @@ Nomad::Nomad(const World& world, const NomadParams& params)
   : world_(world),
     params_(params),
     rng_(params.seed),
+    slip_rng_(params.seed),
     pose_(Eigen::Vector3d::Zero()),
     odometry_(Eigen::Vector3d::Zero())
 {
@@ -119,6 +124,22 @@ bool Nomad::command(const Velocity& velocity)
   return true;
 }
 
+double Nomad::grip(double dt)
+{
+  if (params_.slip_share == 0.0)
+  {
+    return 1.0;
+  }
+  for (grip_left_ -= dt; grip_left_ <= 0.0;)
+  {
+    slips_ = !slips_;
+    const double share = slips_ ? params_.slip_share : 1.0 - params_.slip_share;
+    const double mean = params_.slip_duration * share / params_.slip_share;
+    grip_left_ -= mean * std::log(1.0 - uniform(slip_rng_, 0.0, 1.0));  // how long it lasts: exponentially distributed
+  }
+  return slips_ ? 1.0 - params_.slip_loss : 1.0;
+}
+
 void Nomad::step(double dt)
 {
   const Eigen::Vector2d change = commanded_.head<2>() - velocity_.head<2>();
@@ -127,7 +148,7 @@ void Nomad::step(double dt)
   velocity_.z() += std::clamp(commanded_.z() - velocity_.z(), -turn, turn);
 
   Eigen::Vector3d motion = velocity_ * dt;
-  const Eigen::Vector3d next = moved(pose_, motion);
+  const Eigen::Vector3d next = moved(pose_, grip(dt) * motion);
   blocked_by_ = touchedObstacle(world_, next.head<2>(), params_.radius);
   if (blocked_by_.empty())
   {

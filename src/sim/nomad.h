@@ -30,7 +30,10 @@ struct NomadParams
   double deadband_turn_rate = 0.0;     ///< slower commands do not turn it [rad/s]
   double odometry_turn_drift = 0.0;    ///< turn that odometry adds, by the way driven [rad/m]
   double odometry_noise = 0.0;         ///< standard deviation of the measured motion, as a part of it
-  std::uint64_t seed = 1;              ///< of odometry's noise
+  double slip_share = 0.0;             ///< share of the time in which the wheels slip, for short spells; [0, 1)
+  double slip_loss = 0.5;              ///< part of the wheels' motion that is lost while they slip; [0, 1]
+  double slip_duration = 0.5;          ///< of a spell, in the mean [s]
+  std::uint64_t seed = 1;              ///< of odometry's noise and of the spells
 
   /** Each fault in one line, those of nested parameters included; empty when the parameters are usable. */
   std::vector<std::string> validate() const;
@@ -41,7 +44,7 @@ std::vector<Parameter> parameters(NomadParams& params);
 
 /**
  * A base. By default it is holonomic like the Nomad 200, which moves in any direction without turning and turns without
- * moving. Its poses lie on the floor.
+ * moving. Its poses lie on the floor. Odometry measures how the wheels turn: while they slip, that is more than the way.
  */
 class Nomad
 {
@@ -78,7 +81,7 @@ public:
   Eigen::Isometry3d pose() const;
   /** World from the camera's optical frame. */
   Eigen::Isometry3d cameraPose() const;
-  /** The true velocity. */
+  /** The velocity of the wheels: the true one, except while they slip. */
   const Velocity& velocity() const
   {
     return velocity_;
@@ -97,9 +100,15 @@ public:
   }
 
 private:
+  /** The part of the wheels' motion in the next `dt` [s] that moves the base. */
+  double grip(double dt);
+
   const World& world_;
   NomadParams params_;
   Rng rng_;
+  Rng slip_rng_;              // of its own, so that odometry's noise is the same with and without slip
+  bool slips_ = true;         // now; the first step ends that
+  double grip_left_ = 0.0;    // until that changes [s]
   Eigen::Vector3d pose_;      // x, y, yaw in the world
   Eigen::Vector3d odometry_;  // the same in the odometry's frame
   Velocity velocity_ = Velocity::Zero();

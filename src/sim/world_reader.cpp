@@ -185,12 +185,13 @@ public:
 private:
   void readRobot(const YAML::Node& node)
   {
-    requireKeys(node, "'robot'", { "kind", "camera_height", "position", "yaw_deg" });
+    requireKeys(node, "'robot'", { "kind", "camera_height", "camera_ahead", "position", "yaw_deg" });
     const auto kind = convert<std::string>(required(node, "kind", "'robot'"), "kind");
     if (kind == "nomad")
     {
       world_.robot = RobotKind::NOMAD;
       world_.camera_on_base.translation().z() = positive(node, "camera_height", 1.0);
+      world_.camera_on_base.translation().x() = numberOr(node, "camera_ahead", 0.0);
       // Optical: z forward, x right, y down, of a base with x forward, y left, z up.
       world_.camera_on_base.linear() << 0.0, 0.0, 1.0, -1.0, 0.0, 0.0, 0.0, -1.0, 0.0;
     }

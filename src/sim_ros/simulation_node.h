@@ -20,6 +20,7 @@
 #include <ros/subscriber.h>
 #include <ros/wall_timer.h>
 #include <sensor_msgs/image_encodings.h>
+#include <opencv2/imgproc.hpp>
 
 #include <algorithm>
 #include <atomic>
@@ -42,7 +43,7 @@ namespace view_servo::sim
  * Its private parameters are those of SimulationParams and of the robot.
  *
  * Publishes:
- *  - `camera/image_raw` (sensor_msgs/Image, mono8; drawn only when somebody listens), `camera/camera_info`, at the
+ *  - `camera/image_raw` (sensor_msgs/Image; drawn only when somebody listens), `camera/camera_info`, at the
  *    world's rate or as fast as it can be drawn;
  *  - `ground_truth` (geometry_msgs/PoseStamped): the camera's true pose in `world`, with the stamp of each image;
  *  - `/diagnostics` (diagnostic_msgs/DiagnosticArray): 1 Hz;
@@ -233,7 +234,11 @@ private:
         const std::lock_guard<std::mutex> lock(camera_mutex_);
         image = camera_->capture(poses);
       }
-      image_publisher_.publish(toImage(image, sensor_msgs::image_encodings::MONO8, info.header), info);
+      if (params_.encoding != sensor_msgs::image_encodings::MONO8)
+      {
+        cv::cvtColor(image, image, cv::COLOR_GRAY2RGB);
+      }
+      image_publisher_.publish(toImage(image, params_.encoding, info.header), info);
     }
     ground_truth_publisher_.publish(toGroundTruth(poses[poses.size() / 2], stamp));
   }

@@ -111,6 +111,8 @@ Nomad nomadAt(const World& world, const HomingTrialParams& params, const PlanarP
   nomad_params.odometry_turn_scale = params.conditions.odometry_turn_scale;
   nomad_params.deadband_speed = params.conditions.deadband_speed;
   nomad_params.deadband_turn_rate = params.conditions.deadband_turn_rate;
+  nomad_params.slip_share = params.conditions.slip_share;
+  nomad_params.slip_loss = params.conditions.slip_loss;
   nomad_params.seed = params.seed;
   Nomad nomad(world, nomad_params);
   nomad.setPose(planarPose(start.x, start.y, start.yaw));

@@ -29,6 +29,8 @@ struct HomingConditions
   double deadband_speed = 0.0;       ///< slower commands do not move the base [m/s]
   double deadband_turn_rate = 0.0;   ///< slower commands do not turn it [rad/s]
   double odometry_delay = 0.0;       ///< how much later odometry is stamped than images of the same moment [s]
+  double slip_share = 0.0;           ///< share of the time in which the wheels slip
+  double slip_loss = 0.5;            ///< part of their motion that is lost then
 };
 
 /** Options of HomingTrials. */

@@ -5,8 +5,8 @@
  * The files in config/ and the tables in docs/ say what the tables of parameters in the sources say: names,
  * types, defaults, units, ranges and meanings. VIEW_SERVO_UPDATE=1 writes them anew.
  */
-#include "sim/nomad.h"
 #include "sim/puma.h"
+#include "sim_ros/nomad_robot.h"
 #include "sim_ros/run_params.h"
 #include "sim_ros/simulation_params.h"
 #include "support/text_file.h"
@@ -51,7 +51,7 @@ public:
   ViewStoreNodeParams store;
   ViewRecognizerNodeParams recognizer;
   sim::SimulationParams simulation;
-  sim::NomadParams nomad;
+  sim::NomadNodeParams nomad;
   sim::PumaParams puma;
   RunParams homing_run = homingRunParams();
   RunParams route_run = routeRunParams();

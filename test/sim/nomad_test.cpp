@@ -201,6 +201,52 @@ TEST(Nomad, TheCameraLooksAhead)
   EXPECT_TRUE(camera.linear().col(1).isApprox(-Eigen::Vector3d::UnitZ()));  // down
 }
 
+TEST(Nomad, OdometryTellsTheWheelsWhileTheySlip)
+{
+  const World world = emptyWorld();
+  NomadParams params;
+  params.slip_share = 0.3;
+  params.slip_loss = 0.5;
+  Nomad nomad(world, params);
+  nomad.command({ -0.4, 0.0, 0.0 });
+  run(nomad, 1.0);
+  constexpr int STEPS = 100000;
+  int slipping = 0;
+  int spells = 0;
+  bool slipped = false;
+  for (int i = 0; i < STEPS; ++i)
+  {
+    const double before = nomad.pose().translation().x();
+    const double measured_before = nomad.odometry().translation().x();
+    nomad.step(DT);
+    const double way = before - nomad.pose().translation().x();
+    EXPECT_NEAR(measured_before - nomad.odometry().translation().x(), 0.4 * DT, 1e-9);
+    const bool slips = way < 0.3 * DT;
+    EXPECT_NEAR(way, (slips ? 0.2 : 0.4) * DT, 1e-9);
+    slipping += slips ? 1 : 0;
+    spells += slips && !slipped ? 1 : 0;
+    slipped = slips;
+  }
+  EXPECT_NEAR(static_cast<double>(slipping) / STEPS, 0.3, 0.03);
+  EXPECT_NEAR(slipping * DT / spells, params.slip_duration, 0.1);
+}
+
+TEST(Nomad, SlipsTheSameWayForTheSameSeed)
+{
+  const World world = emptyWorld();
+  NomadParams params;
+  params.slip_share = 0.3;
+  const auto driven = [&](std::uint64_t seed) {
+    params.seed = seed;
+    Nomad nomad(world, params);
+    nomad.command({ -0.3, 0.0, 0.2 });
+    run(nomad, 5.0);
+    return nomad.pose().matrix();
+  };
+  EXPECT_EQ(driven(1), driven(1));
+  EXPECT_NE(driven(1), driven(2));
+}
+
 TEST(Nomad, NamesAllFaultsOfItsParameters)
 {
   const World world = emptyWorld();
@@ -208,7 +254,8 @@ TEST(Nomad, NamesAllFaultsOfItsParameters)
   params.max_speed = 0.0;
   params.radius = -1.0;
   params.odometry_noise = std::numeric_limits<double>::quiet_NaN();
-  EXPECT_EQ(params.validate().size(), 3U);
+  params.slip_share = 1.0;
+  EXPECT_EQ(params.validate().size(), 4U);
   EXPECT_THROW(Nomad(world, params), std::invalid_argument);
 }
 

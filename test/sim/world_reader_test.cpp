@@ -99,6 +99,15 @@ INSTANTIATE_TEST_SUITE_P(Config, ShippedWorldTest, testing::ValuesIn(worldFiles(
                            return fs::path(file.param).stem().string();
                          });
 
+TEST(WorldReader, PutsTheCameraOnTheBase)
+{
+  const test::TemporaryDirectory directory;
+  const std::string file =
+      test::writeText(directory.path() / "world.yaml",
+                      test::edited(SMALL_WORLD, "camera_height: 1.0", "camera_height: 0.6, camera_ahead: -0.15"));
+  EXPECT_EQ(readWorld(file).camera_on_base.translation(), Eigen::Vector3d(-0.15, 0.0, 0.6));
+}
+
 TEST(WorldReader, FaultsNameFileAndLine)
 {
   EXPECT_EQ(faultOf("fx: 500", "fx: 500"), "");
@@ -110,6 +119,7 @@ TEST(WorldReader, FaultsNameFileAndLine)
   };
   expectFault("kind: nomad", "kind: tank", "1", "unknown kind of robot 'tank'");
   expectFault("camera_height: 1.0", "camera_height: -1.0", "1", "camera_height must be positive");
+  expectFault("camera_height: 1.0", "camera_ahead: .inf", "1", "camera_ahead must be finite");
   expectFault("fx: 500", "fxx: 500", "2", "unknown key 'fxx'");
   expectFault("fx: 500", "fx: .nan", "2", "fx must be finite");
   expectFault("fx: 500", "width: 640.5", "2", "whole numbers");
