@@ -327,6 +327,7 @@ MarkerArray toMarkers(const PlaneScene& scene)
   Marker patch = markerOf(odom, "plane", Marker::TRIANGLE_LIST, 1.0, OF_PLANE,
                           filled(onPlane(cornersOf(scene.region), scene.camera, normal, distance)));
   patch.scale.y = patch.scale.z = 1.0;
+  patch.colors.assign(patch.points.size(), OF_PLANE);  // then rviz does not shade it, so that its back is not black
   markers.push_back(at(view_in_odom, patch));
 
   const Points& found = scene.track.homography.points;
