@@ -174,14 +174,32 @@ public:
     }
     for (const ViewTracker::Point& point : tracker_.points())
     {
-      const bool seen =
-          std::find(supporters_.begin(), supporters_.end(), point.landmark.reference) != supporters_.end();
-      const double information = scale_ * scale_ * point.information * (seen || !report_.at_view ? 1.0 : FADING);
+      const double fading = supports(point) || !report_.at_view ? 1.0 : FADING;
+      const double information = scale_ * scale_ * point.information * fading;
       const Eigen::Vector2d pixel =
           target_.view_camera.project(target_.mount.unlevel(point.landmark.reference).homogeneous());
       if (information >= LEAST && pixel.allFinite())
       {
         result.points.push_back({ pixel, point.landmark.inverse_depth / scale_, information });
+      }
+    }
+    return result;
+  }
+
+  std::vector<HomingLandmark> landmarks() const override
+  {
+    std::vector<HomingLandmark> result;
+    if (!isMetric())
+    {
+      return result;
+    }
+    for (const ViewTracker::Point& point : tracker_.points())
+    {
+      const double depth = scale_ / point.landmark.inverse_depth;
+      if (depth > 0.0 && std::isfinite(depth))
+      {
+        const Eigen::Vector3d level = depth * point.landmark.reference.homogeneous();
+        result.push_back({ target_.mount.level_from_camera.transpose() * level, supports(point) });
       }
     }
     return result;
@@ -317,6 +335,12 @@ private:
   static constexpr int ENOUGH_CORRECTIONS = 10;      // of the scale, each by a fifth, until it is that of metres
   static constexpr double IN_PLACE = 1.5;            // median displacement of the view's points at the view [px]
   static constexpr int MIN_UPDATES = 2;              // sets of matches that agree before a hypothesis is followed
+
+  /** Whether a point was found where the pose puts it, in the last image in which the points were found. */
+  bool supports(const ViewTracker::Point& point) const
+  {
+    return std::find(supporters_.begin(), supporters_.end(), point.landmark.reference) != supporters_.end();
+  }
 
   /** The base's pose at the view, in odometry's frame. */
   PlanarPose goalInOdom() const

@@ -36,7 +36,8 @@ namespace view_servo
  *  - `cmd_vel` (geometry_msgs/Twist, in base_link) and `cmd_vel_stamped`, or `cmd_vel_dry` and `cmd_vel_dry_stamped`; zero
  *    for a while after each end, then nothing;
  *  - `heading` (view_servo/Heading): for each image; `heading_arrow` (geometry_msgs/PoseStamped): the same for rviz, at
- *    the base, its x axis towards the view, while there is a heading. `view_pose` (geometry_msgs/PoseWithCovarianceStamped).
+ *    the base, its x axis towards the view, while there is a heading. `view_pose` (geometry_msgs/PoseWithCovarianceStamped);
+ *  - `~markers` (visualization_msgs/MarkerArray): see ViewHoming.
  * Action: `home` (view_servo/HomeToView).
  *
  * A thread of the driver's own works on images and matches, and leaves a Course; every cycle of control follows it by the

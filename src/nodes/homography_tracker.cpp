@@ -4,8 +4,11 @@
 
 #include "view_servo/Homography.h"
 #include "view_servo/SetView.h"
+#include "view_servo/control/travelled_way.h"
 #include "view_servo/ros/camera_input.h"
 #include "view_servo/ros/conversions.h"
+#include "view_servo/ros/marker_output.h"
+#include "view_servo/ros/markers.h"
 #include "view_servo/ros/node_base.h"
 #include "view_servo/ros/node_params.h"
 #include "view_servo/ros/node_type_of.h"
@@ -14,6 +17,7 @@
 #include "view_servo/ros/plane_session.h"
 #include "view_servo/ros/session_starter.h"
 #include "view_servo/ros/timings.h"
+#include "view_servo/ros/transform_source.h"
 #include "view_servo/ros/view_choice.h"
 #include "view_servo/tracking/plane_finder.h"
 #include "view_servo/tracking/plane_tracker.h"
@@ -107,6 +111,8 @@ std::string nameOf(TrackingState state)
  *    the camera is not calibrated, or not any more as when it began) is refused, likewise;
  *  - `~overlay` (sensor_msgs/Image, bgr8): the view's outline and points, and the path of its middle; drawn when somebody
  *    listens;
+ *  - `~markers` (visualization_msgs/MarkerArray, latched): plane, view, camera and ways, see markers.h; of each image while
+ *    somebody listens, deleted when another view or none is chosen;
  *  - `/diagnostics` (diagnostic_msgs/DiagnosticArray): 1 Hz, camera and tracking.
  *
  * Services:
@@ -128,7 +134,8 @@ public:
       searcher_(finder_, params_.match_period, [this] { onAnswer(); }),
       camera_(nh, private_nh, params_.camera, [this](const CameraFrame& frame) { onFrame(frame); }),
       starter_(nh, params_.sessions, finder_.features(), camera_),
-      transport_(private_nh)
+      transport_(private_nh),
+      markers_(private_nh)
   {
     homography_publisher_ = private_nh_.advertise<Homography>("homography", 5);
     overlay_publisher_ = transport_.advertise("overlay", 1);
@@ -206,6 +213,7 @@ private:
     ++task_number_;
     newest_.reset();
     status_ = Status();
+    markers_.clear();
     if (!choice_.chosen().view.empty())
     {
       status_.reason = LOOKS_FOR_IT;
@@ -256,6 +264,7 @@ private:
         session_ = std::move(prepared_);
         last_frame_ = Clock::now();
         unfound_.reset();
+        driven_.clear();
         ++era_;
       }
       const std::optional<CameraFrame> frame = std::exchange(newest_, std::nullopt);
@@ -325,6 +334,8 @@ private:
       ROS_ERROR_STREAM_THROTTLE(10.0, reason << ": view '" << task.chosen.view << "' has to be chosen anew");
       updateStatus(task, PlaneTrack(), reason);
       publishHomography(task, PlaneTrack(), header, reason, true);
+      const std::lock_guard<std::mutex> lock(mutex_);
+      markers_.clear();
       return;
     }
     const cv::Mat image = toGrey(*frame.image);
@@ -338,6 +349,7 @@ private:
     {
       ROS_WARN_STREAM("time has gone back in images: the view is looked for anew");
       ++era_;
+      driven_.clear();
       news = LOOKS_FOR_IT;
     }
     const std::optional<Eigen::Isometry3d> camera_in_odom =
@@ -357,6 +369,7 @@ private:
       }
     }
     publish(task, track, header, news);
+    draw(task, header, camera_in_odom);
     const std::lock_guard<std::mutex> lock(mutex_);
     timings_.add(1e3 * std::chrono::duration<double>(Clock::now() - begin_time).count());
   }
@@ -375,6 +388,7 @@ private:
     const std::string news = startWhere(*search);
     const PlaneTrack track = search->answer.h ? session_->add(unfound_->image, unfound_->camera_in_odom) : PlaneTrack();
     publish(task, track, unfound_->header, news);
+    draw(task, unfound_->header, unfound_->camera_in_odom);
     if (track.state == TrackingState::TRACKING)
     {
       unfound_.reset();
@@ -418,6 +432,31 @@ private:
           task.chosen.view + ": " + nameOf(track.state) + (reason.empty() ? ", " + points : ": " + reason);
       overlay_publisher_.publish(boost::make_shared<const sensor_msgs::Image>(
           toImage(session_->overlay(text), sensor_msgs::image_encodings::BGR8, header)));
+    }
+  }
+
+  /** Publishes what is known as markers, if somebody wants them. */
+  void draw(const Task& task, const std_msgs::Header& header, const std::optional<Eigen::Isometry3d>& camera_in_odom)
+  {
+    if (camera_in_odom)
+    {
+      driven_.add(camera_in_odom->translation());
+    }
+    if (!markers_.wanted())
+    {
+      return;
+    }
+    PlaneScene scene = session_->scene();
+    scene.header = header;
+    scene.header.frame_id = withoutSlash(header.frame_id);
+    scene.odom_frame = withoutSlash(params_.sessions.odom_frame);
+    scene.camera_in_odom = camera_in_odom;
+    scene.driven = driven_.places();
+    const visualization_msgs::MarkerArray markers = toMarkers(scene);
+    const std::lock_guard<std::mutex> lock(mutex_);
+    if (task.number == task_number_)  // else another view is followed by now, and these markers are deleted
+    {
+      markers_.publish(markers);
     }
   }
 
@@ -522,6 +561,7 @@ private:
   std::unique_ptr<PlaneSession> session_;
   Clock::time_point last_frame_;  // or when the session began
   std::uint64_t era_ = 0;         // counts sessions, and times that time went back
+  TravelledWay driven_;           // by the camera since then
   std::optional<Unfound> unfound_;
   struct
   {
@@ -533,6 +573,7 @@ private:
   CameraInput camera_;
   SessionStarter starter_;
   image_transport::ImageTransport transport_;
+  MarkerOutput markers_;
   ros::Publisher homography_publisher_;
   image_transport::Publisher overlay_publisher_;
   ros::Subscriber wanted_subscriber_;

@@ -12,16 +12,16 @@
 namespace view_servo
 {
 std::shared_ptr<HomingTask> makeHomingTask(const LearntView& stored, const sensor_msgs::CameraInfoConstPtr& info,
-                                           const CameraMount& mount, const HomingParams& params)
+                                           const Eigen::Isometry3d& base_from_camera, const HomingParams& params)
 {
   HomingTarget target;
   target.image = stored.view.image;
   target.camera = toCamera(*info);
   target.view_camera = cameraOf(stored.view, target.camera);
-  target.mount = mount;
+  target.mount = CameraMount(base_from_camera);
   target.structure = stored.structure;
-  return std::make_shared<HomingTask>(
-      HomingTask{ stored.view.name, stored.revision, info, makeHoming(params, target), false, false });
+  return std::make_shared<HomingTask>(HomingTask{ stored.view.name, stored.revision, info, makeHoming(params, target),
+                                                  false, false, target.camera, target.view_camera, base_from_camera });
 }
 
 LearntView loadLearntView(const ViewStore& store, const std::string& name)

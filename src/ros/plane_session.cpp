@@ -104,6 +104,16 @@ const PlaneTrack& PlaneSession::add(const cv::Mat& raw, const std::optional<Eige
   return track;
 }
 
+PlaneScene PlaneSession::scene() const
+{
+  PlaneScene scene;
+  scene.camera = rectification_.to();
+  scene.region = region_;
+  scene.track = tracker_->track();
+  scene.points = tracker_->points();
+  return scene;
+}
+
 cv::Mat PlaneSession::overlay(const std::string& text) const
 {
   const TrackedHomography& homography = tracker_->track().homography;

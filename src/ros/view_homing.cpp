@@ -7,6 +7,7 @@
 #include "view_servo/ros/base_conversions.h"
 #include "view_servo/ros/conversions.h"
 #include "view_servo/ros/image_source.h"
+#include "view_servo/ros/markers.h"
 
 #include <nav_msgs/Odometry.h>
 
@@ -48,9 +49,11 @@ ViewHoming::ViewHoming(DriverContext& context, const HomingDriverParams& params,
     lines_("matches", context.resolved("line_matches")),
     store_(viewsDir(params.views_dir)),
     output_(context.nodeHandle(), context.commandTopic(), base_frame_),
+    markers_(context.privateNodeHandle()),
     worker_(
         [this](const HomingOutcome& outcome) {
           context_.runLocked("the outcome of an image", [&] { onOutcome(outcome); });
+          draw(outcome);
           if (hooks_.on_work)
           {
             hooks_.on_work(outcome);
@@ -113,9 +116,9 @@ std::string ViewHoming::odometryLacks() const
 std::shared_ptr<HomingTask> ViewHoming::makeTask(const LearntView& stored, const CameraFrame& frame,
                                                  const HomingParams& params) const
 {
-  const CameraMount mount(
-      toIsometry(transforms_.lookUp(base_frame_, frame.image->header.frame_id, ros::Time(0), 0.0).transform));
-  return makeHomingTask(stored, frame.info, mount, params);
+  const geometry_msgs::TransformStamped base_from_camera =
+      transforms_.lookUp(base_frame_, frame.image->header.frame_id, ros::Time(0), 0.0);
+  return makeHomingTask(stored, frame.info, toIsometry(base_from_camera.transform), params);
 }
 
 // ------------------------------------------------------------------------------------------------ the task, control
@@ -136,6 +139,11 @@ void ViewHoming::setTask(std::shared_ptr<HomingTask> task)
   does_without_matches_ = false;
   needMatches(true);
   motion_.clear();
+  markers_.clear();
+  if (!task_)
+  {
+    driven_.clear();
+  }
   worker_.setTask(task_);
 }
 
@@ -230,6 +238,10 @@ void ViewHoming::onOdometry(const nav_msgs::Odometry& message)
   {
     travelled_ += base_in_odom_ ? compose(inverse(*base_in_odom_), reading->pose).distance() : 0.0;
     base_in_odom_ = reading->pose;
+    if (task_)
+    {
+      driven_.add({ reading->pose.x, reading->pose.y, 0.0 });
+    }
     call(hooks_.on_odometry);
     if (const std::string fault = motion_.addOdometry(ros::Time::now().toSec(), reading->pose); !fault.empty())
     {
@@ -284,6 +296,37 @@ void ViewHoming::onOutcome(const HomingOutcome& outcome)
     setTask(nullptr);  // watched anew with the next image
   }
   call(hooks_.on_image_outcome);
+}
+
+void ViewHoming::draw(const HomingOutcome& outcome)
+{
+  if (!outcome.frame_time || !outcome.fault.empty() || !markers_.wanted())
+  {
+    return;
+  }
+  const HomingTask& task = *outcome.task;
+  HomingScene scene;
+  context_.locked([&] {
+    scene.odom_frame = odometry_.frame();
+    scene.base = base_in_odom_.value_or(PlanarPose());
+    scene.driven = driven_.places();
+  });
+  scene.stamp = toStamp(outcome.report.stamp);
+  scene.base_frame = base_frame_;
+  scene.report = outcome.report;
+  scene.course = outcome.course;
+  scene.camera = task.camera;
+  scene.camera_frame = withoutSlash(task.info->header.frame_id);
+  scene.view_camera = task.view_camera;
+  scene.base_from_camera = task.base_from_camera;
+  scene.landmarks = task.homing->landmarks();
+  const visualization_msgs::MarkerArray markers = toMarkers(scene);
+  context_.locked([&] {
+    if (task_ == outcome.task)  // else it has ended meanwhile, and its markers are deleted
+    {
+      markers_.publish(markers);
+    }
+  });
 }
 
 }  // namespace view_servo

@@ -149,6 +149,29 @@ TEST(ServoHoming, TellsWhereTheViewIsInMetres)
   EXPECT_LT(run.report().goal_in_odom->distance(), 0.003);
 }
 
+/** In the view's camera: below the horizon on a wall 1.8 m away, above it on one 3.5 m away. */
+TEST(ServoHoming, TellsWhereTheThingsAreThatTheViewShows)
+{
+  const Walls walls;
+  Drive run(walls, servoParams(), { -0.7, 0.2, 0.05 });
+  run.step();
+  EXPECT_TRUE(run.homing().landmarks().empty());
+  run.runFor(60.0);
+  ASSERT_EQ(run.report().state, HomingState::ARRIVED) << run.report().reason;
+  const std::vector<HomingLandmark> landmarks = run.homing().landmarks();
+  ASSERT_GT(landmarks.size(), 30U);
+  int in_place = 0;
+  int supporting = 0;
+  for (const HomingLandmark& landmark : landmarks)
+  {
+    const double wall = landmark.position.y() > 0.0 ? 1.8 : 3.5;
+    in_place += std::abs(landmark.position.z() / wall - 1.0) < 0.15 ? 1 : 0;
+    supporting += landmark.supporting ? 1 : 0;
+  }
+  EXPECT_GT(in_place, 0.8 * static_cast<double>(landmarks.size()));
+  EXPECT_GT(supporting, 0.6 * static_cast<double>(landmarks.size()));
+}
+
 TEST(ServoHoming, LearnsWhereTheViewIsWhenItIsDrivenAwayFromThere)
 {
   const Walls walls;

@@ -116,6 +116,13 @@ struct HomingReport
 /** How far a goal has come. */
 Progress toProgress(const HomingReport& report);
 
+/** A thing that the stored view shows, whose place is known. */
+struct HomingLandmark
+{
+  Eigen::Vector3d position = Eigen::Vector3d::Zero();  ///< in the optical frame of the view's camera [m]
+  bool supporting = false;  ///< it was found in the last image where the pose of the view puts it
+};
+
 /** What homing goes back to. */
 struct HomingTarget
 {
@@ -172,6 +179,12 @@ public:
    * where the base has arrived count less from one time to the next, until they are forgotten.
    */
   virtual ViewStructure structure() const
+  {
+    return {};
+  }
+
+  /** Where the things are that the view shows, while its points are tracked and the distance is known in metres; else none. */
+  virtual std::vector<HomingLandmark> landmarks() const
   {
     return {};
   }

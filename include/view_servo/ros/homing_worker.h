@@ -10,6 +10,7 @@
 #include "view_servo/views/view_store.h"
 
 #include <sensor_msgs/CameraInfo.h>
+#include <Eigen/Geometry>
 
 #include <chrono>
 #include <functional>
@@ -41,15 +42,18 @@ struct HomingTask
   std::unique_ptr<Homing> homing;        ///< only the worker's thread uses it
   bool lesson = false;                   ///< the view is to be learnt: its structure is stored without an arrival, too
   bool structure_stored = false;         ///< storeStructure() has stored the structure
+  Camera camera;                         ///< that is there now
+  Camera view_camera;                    ///< that the view was taken with
+  Eigen::Isometry3d base_from_camera = Eigen::Isometry3d::Identity();  ///< the optical frame's pose in base_link
 };
 
 /**
  * The task of homing to a stored view.
- * @param info calibration of the images that homing will get. @param mount where their camera is on the base.
+ * @param info calibration of the images that homing will get. @param base_from_camera pose of their optical frame in base_link.
  * @throws std::invalid_argument saying why homing to this view by such images cannot be.
  */
 std::shared_ptr<HomingTask> makeHomingTask(const LearntView& stored, const sensor_msgs::CameraInfoConstPtr& info,
-                                           const CameraMount& mount, const HomingParams& params);
+                                           const Eigen::Isometry3d& base_from_camera, const HomingParams& params);
 
 /** The result of the images and matches that the worker took together. */
 struct HomingOutcome

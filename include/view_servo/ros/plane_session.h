@@ -3,6 +3,7 @@
 #pragma once
 
 #include "view_servo/geometry/camera_warp.h"
+#include "view_servo/ros/markers.h"
 #include "view_servo/ros/node_base.h"
 #include "view_servo/tracking/plane_finder.h"
 #include "view_servo/tracking/plane_tracker.h"
@@ -57,6 +58,9 @@ public:
    * @param raw as in question(). @param camera_in_odom as in PlaneTracker::add().
    */
   const PlaneTrack& add(const cv::Mat& raw, const std::optional<Eigen::Isometry3d>& camera_in_odom);
+
+  /** What is known after the last image, without its header, the camera's pose, and the way that it has gone. */
+  PlaneScene scene() const;
 
   /** Draws what was found in the last image, with a text below. */
   cv::Mat overlay(const std::string& text) const;

@@ -6,12 +6,14 @@
 #include "view_servo/control/course.h"
 #include "view_servo/control/homing.h"
 #include "view_servo/control/motion_watch.h"
+#include "view_servo/control/travelled_way.h"
 #include "view_servo/control/velocity_limiter.h"
 #include "view_servo/ros/base_output.h"
 #include "view_servo/ros/camera_input.h"
 #include "view_servo/ros/driver_context.h"
 #include "view_servo/ros/driver_params.h"
 #include "view_servo/ros/homing_worker.h"
+#include "view_servo/ros/marker_output.h"
 #include "view_servo/ros/odometry_input.h"
 #include "view_servo/ros/transform_source.h"
 #include "view_servo/ros/view_answer.h"
@@ -36,7 +38,8 @@ namespace view_servo
  * homes to one view at a time, the one of its task, and whoever owns it decides which.
  *
  * Subscribes `image_raw`, `camera_info` (see CameraInput), `point_matches` (view_servo/PointMatches), `line_matches`
- * (view_servo/LineMatches), `odom` (nav_msgs/Odometry) and tf; publishes what BaseOutput does.
+ * (view_servo/LineMatches), `odom` (nav_msgs/Odometry) and tf; publishes what BaseOutput does, and `~markers`
+ * (visualization_msgs/MarkerArray, latched), see markers.h: of each image while somebody subscribes; deleted with the task.
  *
  * Unless something else is said, members are called with the mutex of the DriverContext held. As its threads call the
  * hooks, it has to be the last member of its owner, so that it is destroyed first.
@@ -90,10 +93,11 @@ public:
   void setTask(std::shared_ptr<HomingTask> task);
   /** Sets whether the base may move without matches although the view's points are not tracked; setTask() sets false. */
   void setDoesWithoutMatches(bool does);
-  /** Makes travelled() zero. */
+  /** Makes travelled() zero, and forgets the way driven. */
   void restartWay()
   {
     travelled_ = 0.0;
+    driven_.clear();
   }
 
   /** The task set last; null: none. */
@@ -152,6 +156,8 @@ private:
   void onOdometry(const nav_msgs::Odometry& message);
   void onMatches(bool wanted, const std_msgs::Header& header, const std::vector<PointMatch>& matches);
   void onOutcome(const HomingOutcome& outcome);
+  /** Publishes what is known as markers, if somebody wants them. By the worker's thread, without the mutex. */
+  void draw(const HomingOutcome& outcome);
 
   DriverContext& context_;
   const HomingDriverParams& params_;
@@ -166,6 +172,7 @@ private:
   ViewAnswer lines_;      // of line_matches
   const ViewStore store_;
   const BaseOutput output_;
+  MarkerOutput markers_;
 
   std::shared_ptr<HomingTask> task_;  // the newest
   HomingReport report_;
@@ -173,6 +180,7 @@ private:
   std::optional<PlanarPose> base_in_odom_;
   MotionWatch motion_;
   double travelled_ = 0.0;
+  TravelledWay driven_;                          // since the goal began, or without one, since there is a task
   int odd_stamps_ = 0;                           // images in a row whose stamps are too far from odometry's
   bool matches_needed_ = true;                   // because the view's points are not tracked
   bool does_without_matches_ = false;            // see setDoesWithoutMatches()
