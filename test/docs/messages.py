@@ -15,7 +15,7 @@ LITERAL_OR_COMMENT = re.compile(r'("(?:\\.|[^"\\\n])*"|\'(?:\\.|[^\'\\\n])+\')|/
 # Functions whose literals are no messages of something wrong.
 NO_MESSAGES = re.compile(
     r"ROS_(INFO|DEBUG)\w*"  # all is well
-    r"|text|real|integer|natural|boolean|path|choice<\w+>|\w+Parameter"  # the meanings of parameters
+    r"|text|real|integer|natural|boolean|path|choice<[\w:]+>|\w+Parameter"  # the meanings of parameters
     r"|line|line\.\w+"  # the meanings of options
     r"|status\.add"  # names of what diagnostics report
     r"|guarded|\w+\.runLocked|runLocked|worker_"  # what was done, before the reason why it failed
