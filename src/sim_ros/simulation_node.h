@@ -225,6 +225,8 @@ private:
       }
       last_view_ = { now };
     }
+    using sensor_msgs::image_encodings::MONO8;
+    using sensor_msgs::image_encodings::RGB8;
     sensor_msgs::CameraInfo info = toCameraInfo(world_, params_.focal_length_error, stamp);
     info.header.frame_id = FrameNames(params_.frame_prefix)(info.header.frame_id);
     if (image_publisher_.getNumSubscribers() > 0)
@@ -234,11 +236,11 @@ private:
         const std::lock_guard<std::mutex> lock(camera_mutex_);
         image = camera_->capture(poses);
       }
-      if (params_.encoding != sensor_msgs::image_encodings::MONO8)
+      if (params_.colour)
       {
         cv::cvtColor(image, image, cv::COLOR_GRAY2RGB);
       }
-      image_publisher_.publish(toImage(image, params_.encoding, info.header), info);
+      image_publisher_.publish(toImage(image, params_.colour ? RGB8 : MONO8, info.header), info);
     }
     ground_truth_publisher_.publish(toGroundTruth(poses[poses.size() / 2], stamp));
   }

@@ -26,7 +26,7 @@ struct SimulationParams
   double focal_length_error = 0.0;
   double control_rate = 50.0;
   std::string frame_prefix;
-  std::string encoding = "mono8";
+  bool colour = false;
 
   /**
    * Reads the world, and gives its camera the noise asked for. @throws std::invalid_argument when it is for another
@@ -71,8 +71,8 @@ inline std::vector<Parameter> parameters(SimulationParams& params)
     text("frame_prefix", params.frame_prefix,
          "put before the names of the robot's frames, with a slash between, so that several robots share one /tf; "
          "its launch file tells robot_state_publisher, too"),
-    choice<std::string>("encoding", params.encoding, { { "mono8", "mono8" }, { "rgb8", "rgb8" }, { "bgr8", "bgr8" } },
-                        "of images; those in colour show greys, too"),
+    choice<bool>("encoding", params.colour, { { "mono8", false }, { "rgb8", true } },
+                 "of images; those in colour show greys, too"),
   };
 }
 

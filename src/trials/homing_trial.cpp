@@ -240,12 +240,16 @@ private:
 
   void control()
   {
-    nomad_.command(limiter_.next(homing_->command(), CONTROL_PERIOD));
+    const BaseVelocity wanted = homing_->command();
+    nomad_.command(limiter_.next(wanted, CONTROL_PERIOD));
     const HomingState state = homing_->report().state;
     if (!end_ && (state == HomingState::ARRIVED || state == HomingState::FAILED))
     {
       end_ = time_;
     }
+    const bool stands = wanted.isZero(0.0);
+    stops_ += under_way_ && stands && !end_ ? 1 : 0;
+    under_way_ = !stands;
   }
 
   void move()
@@ -275,6 +279,7 @@ private:
     outcome.duration = end_ ? *end_ : time_;
     outcome.travelled = travelled_;
     outcome.reversals = reversals_;
+    outcome.stops = stops_;
     outcome.in_sight = images_since_found_ > 0 ? static_cast<double>(images_in_sight_) / images_since_found_ : 0.0;
     outcome.structure = homing_->structure();
     return outcome;
@@ -298,6 +303,8 @@ private:
   double travelled_ = 0.0;
   double sense_ = 0.0;  // last speed ahead or back that was one [m/s]
   int reversals_ = 0;
+  bool under_way_ = false;
+  int stops_ = 0;
   bool found_ = false;
   int images_since_found_ = 0;
   int images_in_sight_ = 0;

@@ -71,6 +71,7 @@ struct HomingOutcome
   double duration = 0.0;        ///< until homing ended [s]
   double travelled = 0.0;       ///< length of the true path [m]
   int reversals = 0;            ///< how often the base changed between driving ahead and back
+  int stops = 0;                ///< how often homing had the base stand that was under way, before it ended
   double in_sight = 0.0;        ///< share of the images in which the view was found, once it had been found
   ViewStructure structure;      ///< what homing has learnt of the view
 };

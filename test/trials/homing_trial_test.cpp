@@ -67,6 +67,7 @@ TEST(HomingTrial, ArrivesInTheDesksWorld)
   EXPECT_GE(outcome.travelled, way - 0.02);
   EXPECT_LT(outcome.travelled, 1.5 * way);
   EXPECT_LT(outcome.duration, 30.0);
+  EXPECT_EQ(outcome.stops, 0);
   // What was told on the way.
   ASSERT_GT(steps.size(), 10U);
   EXPECT_LT(std::hypot(steps.front().base.x - start.x, steps.front().base.y - start.y), 1e-6);
@@ -125,6 +126,21 @@ TEST(HomingTrial, StandsStillWhenNothingOfTheViewIsInSight)
   EXPECT_LT(outcome.duration, 2.5);
 }
 
+TEST(HomingTrial, StandsBetweenMatchesThatComeSeldomWhileNothingIsTracked)
+{
+  const World world = coarseWorldOf("desk");
+  HomingTrialParams params;
+  params.homing.tracker.min_supporting = 100000;
+  params.use_lines = false;
+  params.points_period = 2.5;
+  params.max_duration = 12.0;
+  HomingTrials trials(world, params);
+  const HomingOutcome outcome = trials.run(fromGoal(world, { -0.9, 0.35, 0.1 }));
+  EXPECT_FALSE(outcome.arrived);
+  EXPECT_GT(outcome.travelled, 0.05);
+  EXPECT_GE(outcome.stops, 2);
+}
+
 TEST(HomingTrial, ArrivesFromNearTheViewWithoutDrivingAway)
 {
   HomingTrialParams params;
@@ -178,6 +194,22 @@ TEST(HomingTrial, ArrivesThroughLensesThatBend)
     HomingTrials trials(world, HomingTrialParams());
     SCOPED_TRACE(model);
     expectArrival(trials.run(fromGoal(world, { -0.4, 0.15, 5.0 * DEGREE })), 0.01, 0.5 * DEGREE);
+  }
+}
+
+TEST(HomingTrial, ArrivesWhileWheelsSlip)
+{
+  const World world = coarseWorldOf("desk");
+  const PlanarPose start = fromGoal(world, { -0.9, 0.35, 0.1 });
+  for (const BaseKind base : { BaseKind::HOLONOMIC, BaseKind::DIFFERENTIAL })
+  {
+    HomingTrialParams params;
+    params.homing.approach.base = base;
+    params.conditions.slip_share = 0.3;
+    params.conditions.slip_loss = 0.5;
+    HomingTrials trials(world, params);
+    SCOPED_TRACE(base == BaseKind::HOLONOMIC ? "holonomic" : "differential");
+    expectArrival(trials.run(start), 0.02, 1.0 * DEGREE);
   }
 }
 
