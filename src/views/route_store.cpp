@@ -3,6 +3,7 @@
 #include "view_servo/views/route_store.h"
 
 #include "camera_yaml.h"
+#include "small_yaml_file.h"
 #include "stored_files.h"
 #include "view_servo/parameters/error_text.h"
 
@@ -119,7 +120,7 @@ std::optional<Route> read(const fs::path& directory, const std::string& name)
   {
     return std::nullopt;
   }
-  const YAML::Node node = YAML::Load(withoutChecksum(*text, "its yaml file"));
+  const YAML::Node node = loadBoundedYaml(withoutChecksum(*text, "its yaml file"));
   if (const int format = node["format"].as<int>(); format != FORMAT)
   {
     throw Damage("it has format " + std::to_string(format) + ", not " + std::to_string(FORMAT));

@@ -2,14 +2,62 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "small_yaml_file.h"
 
+#include "view_servo/images/regular_file.h"
+
+#include <cstddef>
 #include <cstdint>
 #include <filesystem>
-#include <fstream>
+#include <optional>
 #include <stdexcept>
 #include <system_error>
 
 namespace view_servo
 {
+namespace
+{
+/** Counts the values of a node, aliases followed. @throws std::runtime_error as soon as there are too many, or too deep. */
+void countValues(const YAML::Node& node, std::size_t depth, std::size_t& count)
+{
+  constexpr std::size_t MOST = 1'000'000;
+  constexpr std::size_t DEEPEST = 100;
+  if (depth > DEEPEST)
+  {
+    throw std::runtime_error("it is nested deeper than " + std::to_string(DEEPEST) +
+                             " times: write it without aliases");
+  }
+  if (++count > MOST)
+  {
+    throw std::runtime_error("it stands for more than a million values: write it without aliases");
+  }
+  for (const auto& entry : node)
+  {
+    if (node.IsMap())
+    {
+      countValues(entry.first, depth + 1, count);
+      countValues(entry.second, depth + 1, count);
+    }
+    else
+    {
+      countValues(entry, depth + 1, count);
+    }
+  }
+}
+
+}  // namespace
+
+YAML::Node loadBoundedYaml(const std::string& text)
+{
+  constexpr std::size_t LARGEST = 4'000'000;  // [bytes]
+  if (text.size() > LARGEST)
+  {
+    throw std::runtime_error("it is larger than 4 MB, as no such file is");
+  }
+  YAML::Node root = YAML::Load(text);
+  std::size_t count = 0;
+  countValues(root, 0, count);
+  return root;
+}
+
 YAML::Node loadSmallYamlFile(const std::string& path)
 {
   constexpr std::uintmax_t LARGEST = 1000000;  // [bytes]
@@ -22,8 +70,12 @@ YAML::Node loadSmallYamlFile(const std::string& path)
   {
     throw std::runtime_error("it is larger than 1 MB, as no such file is");
   }
-  std::ifstream file(path);
-  return YAML::Load(file);
+  const std::optional<std::string> text = readRegularFile(path, LARGEST);
+  if (!text)
+  {
+    throw std::runtime_error("there is no such file");
+  }
+  return loadBoundedYaml(*text);
 }
 
 }  // namespace view_servo

@@ -3,6 +3,7 @@
 #include "view_servo/views/view_store.h"
 
 #include "camera_yaml.h"
+#include "small_yaml_file.h"
 #include "stored_files.h"
 #include "view_servo/images/image_io.h"
 #include "view_servo/parameters/error_text.h"
@@ -226,7 +227,7 @@ std::string toYamlText(const StoredView& view, const std::string& image_file)
 /** @throws Damage when the text is not, to the byte, what toYamlText() wrote. */
 YAML::Node parseYaml(const std::string& text)
 {
-  const YAML::Node node = YAML::Load(withoutChecksum(text, "its yaml file"));
+  const YAML::Node node = loadBoundedYaml(withoutChecksum(text, "its yaml file"));
   if (const int format = node["format"].as<int>(); format != FORMAT)
   {
     throw Damage("it has format " + std::to_string(format) + ", not " + std::to_string(FORMAT));
