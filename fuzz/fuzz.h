@@ -6,6 +6,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <cstdio>
 #include <cstdlib>
 #include <cstring>
 #include <filesystem>
@@ -88,6 +89,25 @@ private:
 
   std::filesystem::path path_;
 };
+
+/** FNV-1a, 64 bits, in hexadecimal, as the stores write it. */
+inline std::string checksum(const std::string& bytes)
+{
+  std::uint64_t sum = 0xcbf29ce484222325ULL;
+  for (const char byte : bytes)
+  {
+    sum = (sum ^ static_cast<unsigned char>(byte)) * 0x100000001b3ULL;
+  }
+  char text[17];
+  std::snprintf(text, sizeof(text), "%016llx", static_cast<unsigned long long>(sum));
+  return text;
+}
+
+/** A text with the checksum that belongs to it, as else nothing behind the check would be reached. */
+inline std::string withChecksum(const std::string& text)
+{
+  return text + "checksum: " + checksum(text) + "\n";
+}
 
 inline std::string toString(const std::uint8_t* data, std::size_t size)
 {

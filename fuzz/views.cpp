@@ -4,26 +4,12 @@
 
 #include "view_servo/views/view_store.h"
 
-#include <cstdio>
 #include <stdexcept>
 
 using namespace view_servo;
 
 namespace
 {
-/** FNV-1a, 64 bits, in hexadecimal, as the store writes it. */
-std::string checksum(const std::string& bytes)
-{
-  std::uint64_t sum = 0xcbf29ce484222325ULL;
-  for (const char byte : bytes)
-  {
-    sum = (sum ^ static_cast<unsigned char>(byte)) * 0x100000001b3ULL;
-  }
-  char text[17];
-  std::snprintf(text, sizeof(text), "%016llx", static_cast<unsigned long long>(sum));
-  return text;
-}
-
 /** A store whose one view has a good image; inputs name it fuzz.IMAGE.png, as PNG encoders differ. */
 class Store
 {
@@ -51,8 +37,7 @@ public:
     {
       yaml.replace(at, sizeof(PLACE) - 1, image_);
     }
-    // With the checksum that belongs to it, as else nothing behind the check would be reached.
-    directory_.write("fuzz.yaml", yaml + "checksum: " + checksum(yaml) + "\n");
+    directory_.write("fuzz.yaml", fuzz::withChecksum(yaml));
     fuzz::readOrRefuse<ViewStoreError>([&] {
       const StoredView view = store_.load("fuzz");
       fuzz::require(view.image.type() == CV_8UC1, "an image is grey");

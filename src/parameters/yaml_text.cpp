@@ -4,6 +4,7 @@
 
 #include <yaml-cpp/yaml.h>
 
+#include <cstddef>
 #include <cstdint>
 #include <filesystem>
 #include <fstream>
@@ -13,9 +14,49 @@
 
 namespace view_servo
 {
+namespace
+{
+/** Counts the values of a node, aliases followed. @throws std::runtime_error as soon as there are too many, or too deep. */
+void countValues(const YAML::Node& node, std::size_t depth, std::size_t& count)
+{
+  constexpr std::size_t MOST = 1'000'000;
+  constexpr std::size_t DEEPEST = 100;
+  if (depth > DEEPEST)
+  {
+    throw std::runtime_error("it is nested deeper than " + std::to_string(DEEPEST) +
+                             " times: write it without aliases");
+  }
+  if (++count > MOST)
+  {
+    throw std::runtime_error("it stands for more than a million values: write it without aliases");
+  }
+  for (const auto& entry : node)
+  {
+    if (node.IsMap())
+    {
+      countValues(entry.first, depth + 1, count);
+      countValues(entry.second, depth + 1, count);
+    }
+    else
+    {
+      countValues(entry, depth + 1, count);
+    }
+  }
+}
+
+}  // namespace
+
 YAML::Node parseYaml(const std::string& text)
 {
-  return YAML::Load(text + '\n');  // the end of a line is what ends it
+  constexpr std::size_t LARGEST = 4'000'000;  // [bytes]
+  if (text.size() > LARGEST)
+  {
+    throw std::runtime_error("it is larger than 4 MB, as no such file is");
+  }
+  YAML::Node root = YAML::Load(text + '\n');  // the end of a line is what ends it
+  std::size_t count = 0;
+  countValues(root, 0, count);
+  return root;
 }
 
 YAML::Node loadSmallYamlFile(const std::string& path)

@@ -108,7 +108,9 @@ void replaceFile(const fs::path& path, std::string_view bytes)
   const fs::path temporary = path.string() + ".tmp";
   try
   {
-    const Descriptor file(temporary, O_WRONLY | O_CREAT | O_TRUNC);
+    fs::remove(
+        temporary);  // what a crash has left, or a link that somebody has put there to have another file overwritten
+    const Descriptor file(temporary, O_WRONLY | O_CREAT | O_EXCL);
     file.write(bytes);
     file.sync();
     fs::rename(temporary, path);
@@ -156,7 +158,7 @@ void Descriptor::sync() const
   }
 }
 
-DirectoryLock::DirectoryLock(const fs::path& directory) : file_(directory / ".lock", O_RDWR | O_CREAT)
+DirectoryLock::DirectoryLock(const fs::path& directory) : file_(directory / ".lock", O_RDWR | O_CREAT | O_NOFOLLOW)
 {
   constexpr std::chrono::seconds PATIENCE(10);
   constexpr std::chrono::milliseconds POLL(5);

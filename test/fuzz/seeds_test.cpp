@@ -14,9 +14,12 @@
 /** Of each target in fuzz/: the function that libFuzzer calls, by another name. They end the program when a promise is broken. */
 extern "C"
 {
+  int fuzzArms(const std::uint8_t* data, std::size_t size);
   int fuzzCameraInfo(const std::uint8_t* data, std::size_t size);
   int fuzzCameras(const std::uint8_t* data, std::size_t size);
+  int fuzzHandEye(const std::uint8_t* data, std::size_t size);
   int fuzzImages(const std::uint8_t* data, std::size_t size);
+  int fuzzRoutes(const std::uint8_t* data, std::size_t size);
   int fuzzSegments(const std::uint8_t* data, std::size_t size);
   int fuzzStructure(const std::uint8_t* data, std::size_t size);
   int fuzzViews(const std::uint8_t* data, std::size_t size);
@@ -63,10 +66,11 @@ TEST_P(FuzzSeedsTest, AreReadOrRefusedWithAReason)
 }
 
 INSTANTIATE_TEST_SUITE_P(Readers, FuzzSeedsTest,
-                         ::testing::Values(Target{ "camera_info", fuzzCameraInfo }, Target{ "cameras", fuzzCameras },
-                                           Target{ "images", fuzzImages }, Target{ "segments", fuzzSegments },
-                                           Target{ "structure", fuzzStructure }, Target{ "views", fuzzViews },
-                                           Target{ "worlds", fuzzWorlds }),
+                         ::testing::Values(Target{ "arms", fuzzArms }, Target{ "camera_info", fuzzCameraInfo },
+                                           Target{ "cameras", fuzzCameras }, Target{ "hand_eye", fuzzHandEye },
+                                           Target{ "images", fuzzImages }, Target{ "routes", fuzzRoutes },
+                                           Target{ "segments", fuzzSegments }, Target{ "structure", fuzzStructure },
+                                           Target{ "views", fuzzViews }, Target{ "worlds", fuzzWorlds }),
                          [](const ::testing::TestParamInfo<Target>& target) { return target.param.name; });
 
 }  // namespace

@@ -313,6 +313,7 @@ public:
     allow(true);  // the goal of a sequence that failed
     stage().patience = EVER;
     hold(false);
+    cancel();
     enable(false);
     RC_ASSERT(soon([this] { return openGoals() == 0; }));
     locked([] {

@@ -168,6 +168,19 @@ TEST_F(HandEyePosesFileTest, NamesWhatIsWrong)
   EXPECT_TRUE(has(faultOfPoses("x: 0.1,", "x: .inf,"), "poses/0/flange is none"));
   EXPECT_TRUE(has(faultOfPoses("x: 0.1,", ""), "poses/0/flange/x"));
   EXPECT_TRUE(has(faultOfPoses("name: shelf", "names: shelf"), "view/name"));
+  // 30,000 corners of 10,000 numbers in 150 kB, and a list that holds itself.
+  std::string bomb = "corners: [&a [0";
+  for (int i = 0; i < 10000; ++i)
+  {
+    bomb += ",1";
+  }
+  bomb += "]";
+  for (int i = 0; i < 30000; ++i)
+  {
+    bomb += ",*a";
+  }
+  EXPECT_TRUE(has(faultOfPoses("corners: [[1, 2]", bomb), "more than a million values"));
+  EXPECT_TRUE(has(faultOfPoses("corners: [[1, 2]", "corners: &a [*a, [1, 2]"), "nested deeper than 100"));
   std::filesystem::remove(path_);
   EXPECT_TRUE(has(test::thrownMessage<std::runtime_error>([this] { readHandEyePosesFile(path_); }), path_));
   EXPECT_THROW(writeHandEyePosesFile({}, (directory_.path() / "nowhere" / "x.yaml").string()), std::runtime_error);

@@ -341,6 +341,20 @@ TEST_F(DamagedRouteTest, IsRefusedWithAGoodChecksum)
   expectOnlyBadDamaged("twice");
   with("base: [", "base: [.nan, ");
   expectOnlyBadDamaged("a list of 3 numbers has 4");
+  std::string bomb = "a: &a [1,1,1,1,1,1,1,1,1,1]\n";
+  for (char name = 'b'; name < 'k'; ++name)
+  {
+    // Each line stands for ten of the one before.
+    const std::string before = std::string("*") + static_cast<char>(name - 1);
+    bomb += std::string(1, name) + ": &" + name + " [" + before;
+    for (int i = 1; i < 10; ++i)
+    {
+      bomb += "," + before;
+    }
+    bomb += "]\n";
+  }
+  forge("bad", bomb + good);
+  expectOnlyBadDamaged("more than a million values");
   for (const char* text : { "", "format: 1\n", "- 1\n", "format: 1\nframe: odom\nviews: 7\n", "{[\n", "a: &a *a\n" })
   {
     forge("bad", text);

@@ -304,6 +304,27 @@ TEST_F(ViewStoreTest, NeverWaitsForWhatIsNotAFile)
   EXPECT_EQ(filesIn(store_.directory()).size(), 6U);
 }
 
+TEST_F(ViewStoreTest, WritesThroughNoLink)
+{
+  store_.save(plainView("desk", 1), false);
+  const TemporaryDirectory elsewhere;
+  const fs::path other = elsewhere.path() / "other";
+  writeText(other, "mine");
+  for (const char* name : { "desk.yaml", "desk.yaml.tmp" })
+  {
+    fs::remove(store_.directory() / name);
+    fs::create_symlink(other, store_.directory() / name);
+    EXPECT_EQ(store_.save(plainView("desk", 2), true), "");
+    EXPECT_EQ(readText(other), "mine") << name;
+    expectSame(store_.load("desk"), plainView("desk", 2));
+  }
+  fs::remove(store_.directory() / ".lock");
+  fs::create_symlink(elsewhere.path() / "made", store_.directory() / ".lock");
+  EXPECT_THROW(store_.save(plainView("desk", 3), true), ViewStoreError);
+  EXPECT_FALSE(fs::exists(elsewhere.path() / "made"));
+  expectSame(store_.load("desk"), plainView("desk", 2));
+}
+
 }  // namespace
 }  // namespace test
 }  // namespace view_servo

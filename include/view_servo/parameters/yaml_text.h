@@ -15,14 +15,16 @@ namespace view_servo
 
 /**
  * What a text in YAML holds. It comes to an end with every text, while YAML::Load() of yaml-cpp 0.6 takes all memory for
- * one that ends after a colon within braces.
- * @throws YAML::Exception when it is no YAML.
+ * one that ends after a colon within braces. Aliases may not make more of it than it seems to be: a few lines of them can
+ * stand for more values than fit into memory.
+ * @throws std::exception when it is no YAML, larger than 4 MB, nested deeper than 100 times, or when it stands for more
+ * than a million values.
  */
 YAML::Node parseYaml(const std::string& text);
 
 /**
  * What a YAML file of at most 1 MB holds.
- * @throws std::exception when there is no regular file, when it cannot be read, is larger, or is no YAML.
+ * @throws std::exception when there is no regular file, when it is larger or cannot be read, or as parseYaml().
  */
 YAML::Node loadSmallYamlFile(const std::string& path);
 
