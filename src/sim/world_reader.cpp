@@ -5,7 +5,6 @@
 #include "sim/textures.h"
 #include "view_servo/images/image_io.h"
 #include "view_servo/parameters/error_text.h"
-#include "views/small_yaml_file.h"
 
 #include <yaml-cpp/yaml.h>
 #include <Eigen/Core>
@@ -506,9 +505,13 @@ World readWorld(const std::string& file)
   }
   try
   {
-    World world = WorldReader(loadSmallYamlFile(file), path.parent_path()).read();
+    World world = WorldReader(YAML::LoadFile(file), path.parent_path()).read();
     world.name = path.stem().string();
     return world;
+  }
+  catch (const YAML::BadFile&)
+  {
+    throw std::invalid_argument(file + ": cannot be read");
   }
   catch (const std::exception& error)
   {
