@@ -10,7 +10,7 @@ TravelledWay::TravelledWay(double spacing, std::size_t most) : first_spacing_(sp
 {
   if (!(spacing > 0.0) || most < 2)
   {
-    throw std::invalid_argument("a travelled way needs a spacing above 0 and at least 2 places");
+    throw std::logic_error("a travelled way needs a spacing above 0 and at least 2 places");
   }
 }
 

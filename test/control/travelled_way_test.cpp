@@ -70,8 +70,8 @@ TEST(TravelledWay, BeginsAnewAfterItWasCleared)
 
 TEST(TravelledWay, RefusesWhatCannotBe)
 {
-  EXPECT_THROW(TravelledWay(0.0), std::invalid_argument);
-  EXPECT_THROW(TravelledWay(0.1, 1), std::invalid_argument);
+  EXPECT_THROW(TravelledWay(0.0), std::logic_error);
+  EXPECT_THROW(TravelledWay(0.1, 1), std::logic_error);
 }
 
 }  // namespace

@@ -8,6 +8,7 @@
 #include <yaml-cpp/yaml.h>
 
 #include <exception>
+#include <stdexcept>
 #include <string>
 
 namespace view_servo
@@ -28,6 +29,24 @@ TEST(YamlText, IsRefusedWhereItEndsTooEarly)
   {
     EXPECT_THROW(parseYaml(text), YAML::Exception) << text;
   }
+}
+
+TEST(YamlText, IsRefusedWhereItsAliasesMakeTooMuchOfIt)
+{
+  std::string bomb = "a0: &a0 [x, x, x, x, x, x, x, x, x, x]\n";
+  for (int i = 1; i < 9; ++i)
+  {
+    const std::string before = "*a" + std::to_string(i - 1);
+    bomb += "a" + std::to_string(i) + ": &a" + std::to_string(i) + " [" + before;
+    for (int k = 1; k < 10; ++k)
+    {
+      bomb += ", " + before;
+    }
+    bomb += "]\n";
+  }
+  EXPECT_THROW(parseYaml(bomb), std::runtime_error);
+  EXPECT_THROW(parseYaml("&a [*a]"), std::runtime_error);
+  EXPECT_THROW(parseYaml(std::string(4000001, '#')), std::runtime_error);
 }
 
 TEST(YamlText, IsRefusedInAFileThatEndsTooEarlyOrIsTooLarge)
