@@ -108,8 +108,8 @@ void replaceFile(const fs::path& path, std::string_view bytes)
   const fs::path temporary = path.string() + ".tmp";
   try
   {
-    fs::remove(
-        temporary);  // what a crash has left, or a link that somebody has put there to have another file overwritten
+    // What a crash has left, or a link that somebody has put there to have another file overwritten
+    fs::remove(temporary);
     const Descriptor file(temporary, O_WRONLY | O_CREAT | O_EXCL);
     file.write(bytes);
     file.sync();
