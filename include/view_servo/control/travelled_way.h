@@ -17,7 +17,10 @@ namespace view_servo
 class TravelledWay
 {
 public:
-  /** @param spacing between the places kept at first [m]; > 0. @param most places that are kept; at least 2. */
+  /**
+   * @param spacing between the places kept at first [m]; > 0. @param most places that are kept; at least 2.
+   * @throws std::logic_error when they are less.
+   */
   explicit TravelledWay(double spacing = 0.01, std::size_t most = 2000);
 
   /** A place, in a frame that does not jump [m]. One that is not finite is left out. */
