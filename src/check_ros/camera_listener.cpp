@@ -16,8 +16,8 @@ namespace view_servo::check
 {
 namespace
 {
-constexpr int QUEUE_SIZE = 5;     // as nodes have it
-constexpr std::size_t KEPT = 20;  // messages of each kind
+constexpr int IMAGE_QUEUE_SIZE = 5;  // as nodes have it
+constexpr std::size_t KEPT = 20;     // messages of each kind
 
 /** The newest message with a stamp; null when there is none. */
 template <typename Pointer>
@@ -59,13 +59,13 @@ CameraListener::CameraListener(const ros::NodeHandle& nh, const Setup& setup)
   image_subscriber_.registerCallback([this](const CameraImageConstPtr& image) {
     guarded("an image on '" + image->topic + "'", [&] { onImage(image); });
   });
-  image_subscriber_.subscribe(nh, ros::NodeHandle("~"), topics_.image, setup.image_transport, QUEUE_SIZE);
+  image_subscriber_.subscribe(nh, ros::NodeHandle("~"), topics_.image, setup.image_transport, IMAGE_QUEUE_SIZE);
   topics_.image = image_subscriber_.getTopic();
   const boost::function<void(const sensor_msgs::CameraInfoConstPtr&)> on_info =
       [this](const sensor_msgs::CameraInfoConstPtr& info) {
         guarded("camera_info on '" + topics_.info + "'", [&] { onInfo(info); });
       };
-  info_subscriber_ = topics_nh.subscribe<sensor_msgs::CameraInfo>(topics_.info, QUEUE_SIZE, on_info);
+  info_subscriber_ = topics_nh.subscribe<sensor_msgs::CameraInfo>(topics_.info, IMAGE_QUEUE_SIZE, on_info);
 }
 
 void CameraListener::onImage(const CameraImageConstPtr& image)

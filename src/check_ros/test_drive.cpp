@@ -5,6 +5,7 @@
 #include "check/judgements.h"
 #include "check_ros/ros_graph.h"
 #include "view_servo/images/image_io.h"
+#include "view_servo/parameters/numbers.h"
 #include "view_servo/ros/conversions.h"
 #include "view_servo/ros/node_base.h"
 #include "view_servo/ros/readiness.h"
@@ -18,8 +19,6 @@ namespace view_servo::check
 {
 namespace
 {
-constexpr double DEGREE = M_PI / 180.0;
-
 Twist along(int axis, double amount)
 {
   Twist way = Twist::Zero();

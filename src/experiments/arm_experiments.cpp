@@ -8,6 +8,7 @@
 #include "sim/world_reader.h"
 #include "tools/package_folder.h"
 #include "trials/arm_trial.h"
+#include "view_servo/parameters/numbers.h"
 #include "view_servo/robust/random.h"
 
 #include <Eigen/Geometry>
@@ -30,12 +31,11 @@ namespace view_servo
 {
 namespace
 {
-constexpr double DEGREES = 180.0 / M_PI;
-constexpr std::array<const char*, 2> WORLDS = { "rice", "mouse" };
+constexpr std::array<const char*, 2> ARM_WORLDS = { "rice", "mouse" };
 constexpr std::array<const char*, 3> STARTS = { "near", "far", "extreme" };
 
 /** One run of servoing. */
-struct Run
+struct ArmRun
 {
   std::string world;
   std::string start;
@@ -54,7 +54,7 @@ struct Row
   std::vector<double> degrees;
 };
 
-sim::ArmTrialParams paramsOf(const Run& run, const sim::World& world)
+sim::ArmTrialParams paramsOf(const ArmRun& run, const sim::World& world)
 {
   Rng rng(run.seed);
   sim::ArmTrialParams params;
@@ -79,7 +79,7 @@ sim::ArmTrialParams paramsOf(const Run& run, const sim::World& world)
 }
 
 /** A few millimetres and degrees beside a world's start, other ones for each run. */
-Eigen::Isometry3d startOf(const Run& run, const sim::World& world)
+Eigen::Isometry3d startOf(const ArmRun& run, const sim::World& world)
 {
   constexpr double LENGTH = 0.01;               // [m]
   constexpr double ANGLE = 1.5 * M_PI / 180.0;  // [rad]
@@ -102,10 +102,10 @@ struct Result
   double least_margin;  ///< of the chosen point from the image's border [px]
 };
 
-std::map<std::string, sim::World> readWorlds()
+std::map<std::string, sim::World> readArmWorlds()
 {
   std::map<std::string, sim::World> worlds;
-  for (const char* world : WORLDS)
+  for (const char* world : ARM_WORLDS)
   {
     worlds.emplace(world, sim::findWorld(world, packageFolder() / "config" / "worlds"));
   }
@@ -113,11 +113,11 @@ std::map<std::string, sim::World> readWorlds()
 }
 
 /** All runs, those from the same start beside each other. */
-std::vector<Run> runsOf(const ExperimentContext& context)
+std::vector<ArmRun> runsOf(const ExperimentContext& context)
 {
   const int runs_each = context.runsOf(ARM_RUNS);
-  std::vector<Run> runs;
-  for (const char* world : WORLDS)
+  std::vector<ArmRun> runs;
+  for (const char* world : ARM_WORLDS)
   {
     for (const char* start : STARTS)
     {
@@ -130,7 +130,7 @@ std::vector<Run> runsOf(const ExperimentContext& context)
   return runs;
 }
 
-Result servo(const Run& run, const sim::World& world, const std::string& urdf)
+Result servo(const ArmRun& run, const sim::World& world, const std::string& urdf)
 {
   const Eigen::Isometry3d start = startOf(run, world);
   sim::ArmTrials trials(world, urdf, paramsOf(run, world));
@@ -147,7 +147,7 @@ Result servo(const Run& run, const sim::World& world, const std::string& urdf)
 }
 
 /** A line of the table, with its end. */
-std::string lineOf(const Run& run, const Result& result)
+std::string lineOf(const ArmRun& run, const Result& result)
 {
   const sim::ArmOutcome& outcome = result.outcome;
   std::string reason = outcome.reason;
@@ -180,7 +180,7 @@ void add(const sim::ArmOutcome& outcome, Row& row)
 void print(std::map<std::string, Row>& table)
 {
   std::printf("%-14s %8s %6s %9s %6s %9s %6s\n", "", "failures", "wrong", "pos [mm]", "std", "ang [deg]", "std");
-  for (const char* world : WORLDS)
+  for (const char* world : ARM_WORLDS)
   {
     for (const char* start : STARTS)
     {
@@ -202,14 +202,14 @@ void runArmExperiment(const ExperimentContext& context, std::ostream& csv)
 {
   std::ifstream urdf_file = openForReading(packageFolder() / "urdf" / "puma560.urdf");
   const std::string urdf{ std::istreambuf_iterator<char>(urdf_file), std::istreambuf_iterator<char>() };
-  const std::map<std::string, sim::World> worlds = readWorlds();
-  const std::vector<Run> runs = runsOf(context);
+  const std::map<std::string, sim::World> worlds = readArmWorlds();
+  const std::vector<ArmRun> runs = runsOf(context);
   std::vector<std::string> lines(runs.size());
   std::map<std::string, Row> table;
   std::mutex mutex;
   std::size_t done = 0;
   inParallel(runs.size(), context.threads, [&](std::size_t i) {
-    const Run& run = runs[i];
+    const ArmRun& run = runs[i];
     const Result result = servo(run, worlds.at(run.world), urdf);
     const std::lock_guard<std::mutex> lock(mutex);
     lines[i] = lineOf(run, result);

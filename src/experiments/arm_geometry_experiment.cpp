@@ -7,6 +7,7 @@
 #include "view_servo/geometry/euclidean_homography.h"
 #include "view_servo/geometry/homography.h"
 #include "view_servo/geometry/rotation_vector.h"
+#include "view_servo/parameters/numbers.h"
 
 #include <Eigen/Geometry>
 #include <Eigen/LU>
@@ -23,7 +24,6 @@ namespace view_servo
 {
 namespace
 {
-constexpr double DEGREES = 180.0 / M_PI;
 constexpr std::size_t MIDDLE = 2 * ArmData::COLUMNS + 4;  // of the board's corners
 constexpr double NONE = std::numeric_limits<double>::quiet_NaN();
 

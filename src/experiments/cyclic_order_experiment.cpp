@@ -5,6 +5,7 @@
 #include "experiments/line_ground_truth.h"
 #include "experiments/point_pairs.h"
 #include "sim/textures.h"
+#include "view_servo/parameters/numbers.h"
 #include "view_servo/views/point_view_matcher.h"
 #include "view_servo/views/prepared_image.h"
 
@@ -16,7 +17,6 @@
 #include <cstdint>
 #include <filesystem>
 #include <iostream>
-#include <limits>
 #include <optional>
 #include <string>
 #include <vector>
@@ -26,8 +26,6 @@ namespace view_servo
 namespace
 {
 namespace fs = std::filesystem;
-
-constexpr double NOT_A_NUMBER = std::numeric_limits<double>::quiet_NaN();
 
 /** A picture on a surface: a drawn one, or one of oxford_affine. */
 struct Picture

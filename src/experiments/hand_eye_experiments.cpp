@@ -12,6 +12,7 @@
 #include "view_servo/geometry/hand_eye.h"
 #include "view_servo/geometry/homography.h"
 #include "view_servo/geometry/rotation_vector.h"
+#include "view_servo/parameters/numbers.h"
 
 #include <Eigen/Geometry>
 #include <opencv2/calib3d.hpp>
@@ -40,8 +41,7 @@ namespace view_servo
 {
 namespace
 {
-constexpr double DEGREES = 180.0 / M_PI;
-constexpr std::array<const char*, 2> WORLDS = { "rice", "mouse" };
+constexpr std::array<const char*, 2> HAND_EYE_WORLDS = { "rice", "mouse" };
 
 double millimetresBetween(const Eigen::Isometry3d& a, const Eigen::Isometry3d& b)
 {
@@ -222,15 +222,15 @@ void runHandEyeExperiment(const ExperimentContext& context, std::ostream& csv)
   const std::string urdf{ std::istreambuf_iterator<char>(urdf_file), std::istreambuf_iterator<char>() };
   const auto runs = static_cast<std::size_t>(context.runsOf(HAND_EYE_RUNS));
   std::map<std::string, sim::World> worlds;
-  for (const char* world : WORLDS)
+  for (const char* world : HAND_EYE_WORLDS)
   {
     worlds.emplace(world, sim::findWorld(world, packageFolder() / "config" / "worlds"));
   }
-  std::vector<std::string> lines(runs * WORLDS.size());
+  std::vector<std::string> lines(runs * HAND_EYE_WORLDS.size());
   std::map<std::string, Row> table;
   std::mutex mutex;
   inParallel(lines.size(), context.threads, [&](std::size_t i) {
-    const std::string world = WORLDS[i / runs];
+    const std::string world = HAND_EYE_WORLDS[i / runs];
     sim::HandEyeTrialParams params;
     params.seed = context.seedOf(HAND_EYE_RUNS, i % runs + 1);
     sim::HandEyeTrial calibration(worlds.at(world), urdf, params);

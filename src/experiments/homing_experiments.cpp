@@ -11,6 +11,7 @@
 #include "view_servo/control/heading_hypotheses.h"
 #include "view_servo/geometry/camera.h"
 #include "view_servo/images/image_io.h"
+#include "view_servo/parameters/numbers.h"
 #include "view_servo/robust/quantile.h"
 #include "view_servo/robust/random.h"
 #include "view_servo/views/line_view_matcher.h"
@@ -40,10 +41,8 @@ namespace
 {
 namespace fs = std::filesystem;
 
-constexpr double DEGREES = 180.0 / M_PI;
-
 /** One run of homing. */
-struct Run
+struct HomingRun
 {
   std::string world;
   BaseKind base;
@@ -54,7 +53,7 @@ struct Run
   std::uint64_t seed;
 };
 
-sim::HomingTrialParams paramsOf(const Run& run)
+sim::HomingTrialParams paramsOf(const HomingRun& run)
 {
   sim::HomingTrialParams params;
   params.seed = run.seed;
@@ -84,7 +83,7 @@ sim::HomingTrialParams paramsOf(const Run& run)
   return params;
 }
 
-std::string toRow(const Run& run, const sim::HomingOutcome& outcome)
+std::string toRow(const HomingRun& run, const sim::HomingOutcome& outcome)
 {
   std::string reason = outcome.reason;
   std::replace(reason.begin(), reason.end(), ',', ';');
@@ -99,7 +98,7 @@ std::string toRow(const Run& run, const sim::HomingOutcome& outcome)
 }
 
 /** What becomes of all random starts under the same conditions. */
-class Summary
+class HomingSummary
 {
 public:
   /** @param distance from the start to the goal [m]. */
@@ -153,9 +152,9 @@ Worlds readWorlds()
 }
 
 /** Runs from random starts under both conditions. @param max_yaw by which starts are turned at most [rad]. */
-std::vector<Run> randomRuns(const Worlds& worlds, BaseKind base, double max_yaw, const ExperimentContext& context)
+std::vector<HomingRun> randomRuns(const Worlds& worlds, BaseKind base, double max_yaw, const ExperimentContext& context)
 {
-  std::vector<Run> runs;
+  std::vector<HomingRun> runs;
   Rng rng(context.seedOf(HOMING_STARTS, HOMING_STARTS.seed));
   const std::array<const char*, 3> names = { "desk", "cabinet", "corridor" };
   for (int i = 0; i < context.runsOf(HOMING_STARTS); ++i)
@@ -172,10 +171,10 @@ std::vector<Run> randomRuns(const Worlds& worlds, BaseKind base, double max_yaw,
 }
 
 /** Does all runs, and writes what came of each. */
-void home(const std::vector<Run>& runs, const Worlds& worlds, const ExperimentContext& context, std::ostream& csv)
+void home(const std::vector<HomingRun>& runs, const Worlds& worlds, const ExperimentContext& context, std::ostream& csv)
 {
   std::vector<std::string> rows(runs.size());
-  std::map<std::string, Summary> summaries;  // of conditions
+  std::map<std::string, HomingSummary> summaries;  // of conditions
   std::mutex mutex;
   std::size_t done = 0;
   inParallel(runs.size(), context.threads, [&](std::size_t i) {
@@ -209,7 +208,7 @@ void runHomingExperiment(const ExperimentContext& context, std::ostream& csv)
 {
   constexpr double MAX_YAW = M_PI / 18.0;
   const Worlds worlds = readWorlds();
-  std::vector<Run> runs;
+  std::vector<HomingRun> runs;
   for (const char* name : { "desk", "cabinet" })
   {
     const PlanarPose start = context.brief ? PlanarPose{ -0.1, 0.05, 0.0 } : toPlanar(worlds.at(name).start("thesis"));
@@ -218,7 +217,7 @@ void runHomingExperiment(const ExperimentContext& context, std::ostream& csv)
       runs.push_back({ name, BaseKind::HOLONOMIC, mode, false, 0, start, context.seedOf(HOMING_STARTS, 1) });
     }
   }
-  const std::vector<Run> random = randomRuns(worlds, BaseKind::HOLONOMIC, MAX_YAW, context);
+  const std::vector<HomingRun> random = randomRuns(worlds, BaseKind::HOLONOMIC, MAX_YAW, context);
   runs.insert(runs.end(), random.begin(), random.end());
   home(runs, worlds, context, csv);
 }

@@ -9,6 +9,7 @@
 #include "view_servo/geometry/homography.h"
 #include "view_servo/matching/assignment.h"
 #include "view_servo/matching/point_matcher.h"
+#include "view_servo/parameters/numbers.h"
 #include "view_servo/robust/multi_hypothesis.h"
 #include "view_servo/robust/quantile.h"
 
@@ -37,8 +38,6 @@ namespace view_servo
 {
 namespace
 {
-constexpr double NOT_A_NUMBER = std::numeric_limits<double>::quiet_NaN();
-
 enum class Algorithm
 {
   RANSAC,      ///< on the one-to-one candidates

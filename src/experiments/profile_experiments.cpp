@@ -5,6 +5,7 @@
 #include "experiments/point_pairs.h"
 #include "experiments/statistics.h"
 #include "view_servo/matching/point_matcher.h"
+#include "view_servo/parameters/numbers.h"
 #include "view_servo/robust/fundamental_estimator.h"
 #include "view_servo/robust/quantile.h"
 #include "view_servo/robust/view_consistency.h"
@@ -25,8 +26,6 @@ namespace view_servo
 {
 namespace
 {
-constexpr double NOT_A_NUMBER = std::numeric_limits<double>::quiet_NaN();
-
 /** The features of both images of a pair, for several ways to match them. */
 class MatchedFeatures
 {

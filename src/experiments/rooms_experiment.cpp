@@ -350,7 +350,7 @@ double errorOf(const Answer& answer, const std::vector<Correspondences>& truth)
   return least;
 }
 
-struct Summary
+struct RoomsSummary
 {
   int pairs = 0;
   int answers = 0;
@@ -374,7 +374,7 @@ void runRoomsExperiment(const ExperimentContext& context, std::ostream& csv)
   {
     pairs.resize(2);
   }
-  std::map<std::pair<std::string, std::string>, Summary> summaries;  // of set and method
+  std::map<std::pair<std::string, std::string>, RoomsSummary> summaries;  // of set and method
   csv << "set,pair,baseline_m,rotation_deg,method,answer,error_px,inliers,ms\n";
   for (const RoomPair& pair : pairs)
   {
@@ -408,7 +408,7 @@ void runRoomsExperiment(const ExperimentContext& context, std::ostream& csv)
       csv << pair.set << ',' << pair.name << ',' << pair.baseline << ',' << pair.rotation << ',' << name << ','
           << (answers[i].f ? 1 : 0) << ',' << error << ',' << answers[i].inliers.size() << ',' << times[i] << '\n';
       std::cerr << ' ' << name << ' ' << error << " px (" << answers[i].inliers.size() << ')';
-      Summary& summary = summaries[{ pair.set, name }];
+      RoomsSummary& summary = summaries[{ pair.set, name }];
       summary.pairs += 1;
       summary.answers += answers[i].f ? 1 : 0;
       summary.right += error < RIGHT ? 1 : 0;

@@ -6,6 +6,7 @@
 #include "sim/world_reader.h"
 #include "tools/package_folder.h"
 #include "trials/route_trial.h"
+#include "view_servo/parameters/numbers.h"
 #include "view_servo/robust/quantile.h"
 #include "view_servo/robust/random.h"
 
@@ -23,8 +24,6 @@ namespace view_servo
 {
 namespace
 {
-constexpr double DEGREES = 180.0 / M_PI;
-
 struct RouteRunOrder
 {
   std::string world;
@@ -93,7 +92,7 @@ std::string toRow(const RouteRunOrder& order, const sim::RouteOutcome& outcome)
 }
 
 /** What becomes of all routes under the same conditions. */
-struct Summary
+struct RouteSummary
 {
   int arrived = 0;
   std::vector<double> rms;
@@ -134,7 +133,7 @@ void runRoutesExperiment(const ExperimentContext& context, std::ostream& csv)
   }
   const std::vector<RouteRunOrder> orders = makeOrders(worlds, context);
   std::vector<std::string> rows(orders.size());
-  std::map<std::string, Summary> summaries;  // of conditions
+  std::map<std::string, RouteSummary> summaries;  // of conditions
   std::mutex mutex;
   inParallel(orders.size(), context.threads, [&](std::size_t i) {
     const RouteRunOrder& order = orders[i];

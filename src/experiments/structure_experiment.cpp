@@ -7,6 +7,7 @@
 #include "sim/world_reader.h"
 #include "tools/package_folder.h"
 #include "trials/homing_trial.h"
+#include "view_servo/parameters/numbers.h"
 #include "view_servo/robust/quantile.h"
 #include "view_servo/robust/random.h"
 
@@ -25,8 +26,6 @@ namespace view_servo
 {
 namespace
 {
-constexpr double DEGREES = 180.0 / M_PI;
-
 /** A room, and what was learnt of its view. */
 struct Lesson
 {
@@ -35,7 +34,7 @@ struct Lesson
   ViewStructure structure;
 };
 
-struct Run
+struct StructureRun
 {
   const Lesson* lesson;
   bool learnt;  ///< the structure is used
@@ -123,7 +122,7 @@ Lesson learn(const std::string& name, BaseKind base, std::uint64_t seed)
 }
 
 /** What becomes of runs with a structure, or without. */
-struct Summary
+struct StructureSummary
 {
   int arrived = 0;
   std::vector<double> seconds;
@@ -169,7 +168,7 @@ void runStructureExperiment(const ExperimentContext& context, std::ostream& csv)
   inParallel(lessons.size(), context.threads, [&](std::size_t i) {
     lessons[i] = learn(names[i / bases.size()], bases[i % bases.size()], context.seedOf(STRUCTURE_STARTS, 1));
   });
-  std::vector<Run> runs;
+  std::vector<StructureRun> runs;
   Rng rng(context.seedOf(STRUCTURE_STARTS, STRUCTURE_STARTS.seed));
   for (int i = 0; i < context.runsOf(STRUCTURE_STARTS); ++i)
   {
@@ -192,10 +191,10 @@ void runStructureExperiment(const ExperimentContext& context, std::ostream& csv)
   });
   csv << "world,base,learnt,start_x,start_y,start_yaw_deg,arrived,distance_error_mm,yaw_error_deg,duration_s,"
          "first_s,first_distance_m,first_error_mm,first_yaw_error_deg\n";
-  std::array<Summary, 4> summaries;
+  std::array<StructureSummary, 4> summaries;
   for (std::size_t i = 0; i < runs.size(); ++i)
   {
-    const Run& run = runs[i];
+    const StructureRun& run = runs[i];
     const sim::HomingOutcome& homing = outcomes[i].homing;
     const FirstPose first = outcomes[i].first.value_or(FirstPose());
     const bool slides = run.lesson->base == BaseKind::HOLONOMIC;

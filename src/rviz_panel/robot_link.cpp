@@ -44,11 +44,6 @@ constexpr double LOOK_PERIOD = 3.0;      // views and topics are looked for [s]
 constexpr double PICTURE_PERIOD = 0.05;  // pictures are decoded at most this often [s]
 constexpr double CURVE_SPAN = 60.0;      // [s]
 
-double secondsSince(Clock::time_point time)
-{
-  return std::chrono::duration<double>(Clock::now() - time).count();
-}
-
 struct DriverKind
 {
   std::string name;

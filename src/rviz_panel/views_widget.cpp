@@ -70,11 +70,6 @@ QString age(double stamp)
   return QString("%1 s ago").arg(static_cast<int>(seconds));
 }
 
-double secondsSince(std::chrono::steady_clock::time_point time)
-{
-  return std::chrono::duration<double>(std::chrono::steady_clock::now() - time).count();
-}
-
 QLabel* wrappedLabel(const QString& name, int lines)
 {
   auto* label = new QLabel;

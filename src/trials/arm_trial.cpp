@@ -17,9 +17,7 @@ namespace view_servo::sim
 {
 namespace
 {
-constexpr double STEP = 0.005;    // of the simulation [s]
-constexpr double SETTLING = 1.0;  // from the end of servoing until the error is measured [s]
-constexpr double COVERED = 2.0;   // how long the camera is covered, if it is [s]
+constexpr double COVERED = 2.0;  // how long the camera is covered, if it is [s]
 
 /** What tracking makes of an image. */
 struct StampedTrack

@@ -23,12 +23,7 @@ namespace view_servo::sim
 {
 namespace
 {
-constexpr double STEP = 0.005;            // of the simulation [s]
-constexpr double ODOMETRY_PERIOD = 0.02;  // [s]
-constexpr double CONTROL_PERIOD = 0.05;   // [s]
-constexpr double IMAGE_DELAY = 0.05;      // from an image's stamp until homing gets it [s]
-constexpr double MOVES = 0.005;           // slower, a base counts as one that stands [m/s]
-constexpr double SETTLING = 1.0;          // from the end of homing until the error is measured [s]
+constexpr double MOVES = 0.005;  // slower, a base counts as one that stands [m/s]
 
 /**
  * Draws somebody who walks by from left to right in 2 s, 1.2 m in front of the camera.
@@ -97,12 +92,6 @@ HomingTrials::~HomingTrials() = default;
 
 namespace
 {
-struct StampedImage
-{
-  double stamp;  // [s]
-  cv::Mat image;
-};
-
 Nomad nomadAt(const World& world, const HomingTrialParams& params, const PlanarPose& start)
 {
   NomadParams nomad_params;

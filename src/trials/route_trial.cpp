@@ -22,23 +22,11 @@ namespace view_servo::sim
 {
 namespace
 {
-constexpr double STEP = 0.005;            // of the simulation [s]
-constexpr double ODOMETRY_PERIOD = 0.02;  // [s]
-constexpr double CONTROL_PERIOD = 0.05;   // [s]
-constexpr double IMAGE_DELAY = 0.05;      // from an image's stamp until homing gets it [s]
-constexpr double SETTLING = 1.0;          // from the end until the error is measured [s]
-
 /** A view of the route, as it is stored. */
 struct RecordedView
 {
   cv::Mat image;
   ViewStructure structure;
-};
-
-struct StampedImage
-{
-  double stamp;  // [s]
-  cv::Mat image;
 };
 
 /** Matches with the view of this number. */
@@ -184,7 +172,7 @@ private:
       {
         base_ = toPlanar(nomad_.odometry());
         homing_->addOdometry(time, base_);
-        guide_->move(base_);
+        guide_->addOdometry(base_);
       }
       if (!end && image_due.due(time))
       {
@@ -219,8 +207,8 @@ private:
     if (const std::optional<StampedImage> ready = images_.take(time))
     {
       homing_->addImage(ready->stamp, ready->image);
-      guide_->see(homing_->report(), base_);
-      if (guide_->due())
+      guide_->addReport(homing_->report(), base_);
+      if (guide_->isTimeToGoOn())
       {
         guide_->goOn();
         beginView();

@@ -2,6 +2,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <opencv2/core.hpp>
+
 #include <deque>
 #include <optional>
 #include <utility>
@@ -11,6 +13,19 @@ namespace view_servo::sim
 /** @file
  * What the trials of both robots need to keep the times of a real driver in simulated time [s].
  */
+
+constexpr double STEP = 0.005;            ///< of the simulation [s]
+constexpr double ODOMETRY_PERIOD = 0.02;  ///< of a base [s]
+constexpr double CONTROL_PERIOD = 0.05;   ///< of a base's driver [s]
+constexpr double IMAGE_DELAY = 0.05;      ///< from an image's stamp until a base's driver gets it [s]
+constexpr double SETTLING = 1.0;          ///< from the end of servoing until the error is measured [s]
+
+/** An image and when it was taken. */
+struct StampedImage
+{
+  double stamp;  ///< [s]
+  cv::Mat image;
+};
 
 /** Something that happens at time 0 and then once a period. */
 class Every

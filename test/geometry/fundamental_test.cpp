@@ -1,6 +1,7 @@
 // Copyright (c) 2026, the view_servo authors
 // SPDX-License-Identifier: BSD-3-Clause
 #include "view_servo/geometry/fundamental.h"
+#include "view_servo/parameters/numbers.h"
 
 #include "../../src/geometry/residuals.h"
 #include "support/synthetic_scene.h"
@@ -18,9 +19,7 @@ namespace view_servo
 {
 namespace
 {
-constexpr double NOT_A_NUMBER = std::numeric_limits<double>::quiet_NaN();
-
-double totalError(const Eigen::Matrix3d& f, const Correspondences& pairs)
+double totalSampsonError(const Eigen::Matrix3d& f, const Correspondences& pairs)
 {
   double sum = 0.0;
   for (const Correspondence& pair : pairs)
@@ -42,7 +41,7 @@ double rmsDistance(const Eigen::Matrix3d& f, const test::Scene& scene)
     const Eigen::Vector3d x = uniform(rng, 3.0, 6.0) * (k_inverse * reference.homogeneous());
     pairs.push_back({ reference, (scene.k * (scene.r * x + scene.t)).hnormalized() });
   }
-  return std::sqrt(totalError(f, pairs) / static_cast<double>(pairs.size()));
+  return std::sqrt(totalSampsonError(f, pairs) / static_cast<double>(pairs.size()));
 }
 
 double nearest(const std::vector<Eigen::Matrix3d>& solutions, const Eigen::Matrix3d& truth)
@@ -116,7 +115,7 @@ RC_GTEST_PROP(FundamentalFromSevenPoints, OneOrThreeSolutionsWithTheTruthAmongTh
   for (const Eigen::Matrix3d& f : solutions)
   {
     RC_ASSERT(std::abs(f.norm() - 1.0) < 1e-12);
-    RC_ASSERT(totalError(f, scene.pairs) < 1e-12);
+    RC_ASSERT(totalSampsonError(f, scene.pairs) < 1e-12);
     RC_ASSERT(f.jacobiSvd().singularValues()(2) < 1e-12);
   }
   RC_ASSERT(nearest(solutions, scene.fundamental) < 1e-6);
@@ -266,9 +265,9 @@ TEST(RefineFundamental, LowersTheErrorAndGetsNearTheTruth)
     const auto linear = fundamentalFromPoints(scene.pairs);
     ASSERT_TRUE(linear);
     const Eigen::Matrix3d refined = refineFundamental(*linear, scene.pairs);
-    const double error = totalError(refined, scene.pairs);
-    EXPECT_LT(error, totalError(*linear, scene.pairs));
-    EXPECT_LT(error, totalError(scene.fundamental, scene.pairs));
+    const double error = totalSampsonError(refined, scene.pairs);
+    EXPECT_LT(error, totalSampsonError(*linear, scene.pairs));
+    EXPECT_LT(error, totalSampsonError(scene.fundamental, scene.pairs));
     EXPECT_LT(rmsDistance(refined, scene), 0.7);
     EXPECT_NEAR(refined.norm(), 1.0, 1e-12);
     EXPECT_LT(std::abs(refined.determinant()), 1e-15);
@@ -281,7 +280,7 @@ TEST(RefineFundamental, NoNearbyMatrixOfRankTwoIsBetter)
   const test::Scene scene = test::makeScene(60, 1.0, 12);
   const Eigen::Matrix3d refined =
       refineFundamental(*fundamentalFromPoints(scene.pairs), scene.pairs, std::numeric_limits<double>::infinity(), 100);
-  const double error = totalError(refined, scene.pairs);
+  const double error = totalSampsonError(refined, scene.pairs);
   for (int i = 0; i < 100; ++i)
   {
     Vector7d step;
@@ -289,7 +288,7 @@ TEST(RefineFundamental, NoNearbyMatrixOfRankTwoIsBetter)
     {
       step(k) = 1e-5 * gaussian(rng);
     }
-    EXPECT_GT(totalError(Orthonormal(refined).moved(step).matrix(), scene.pairs), error);
+    EXPECT_GT(totalSampsonError(Orthonormal(refined).moved(step).matrix(), scene.pairs), error);
   }
 }
 

@@ -5,6 +5,7 @@
 #include "support/cameras.h"
 #include "view_servo/geometry/homography.h"
 #include "view_servo/geometry/rotation_vector.h"
+#include "view_servo/parameters/numbers.h"
 #include "view_servo/robust/random.h"
 
 #include <gtest/gtest.h>
@@ -23,8 +24,6 @@ namespace view_servo
 {
 namespace
 {
-constexpr double DEGREE = M_PI / 180.0;
-
 /** Errors of arm and images, as standard deviations. */
 struct Noise
 {

@@ -1,6 +1,7 @@
 // Copyright (c) 2026, the view_servo authors
 // SPDX-License-Identifier: BSD-3-Clause
 #include "view_servo/geometry/homography.h"
+#include "view_servo/parameters/numbers.h"
 
 #include "../../src/geometry/levenberg_marquardt.h"
 #include "../../src/geometry/residuals.h"
@@ -18,9 +19,7 @@ namespace view_servo
 {
 namespace
 {
-constexpr double NOT_A_NUMBER = std::numeric_limits<double>::quiet_NaN();
-
-double totalError(const Eigen::Matrix3d& h, const Correspondences& pairs)
+double totalTransferError(const Eigen::Matrix3d& h, const Correspondences& pairs)
 {
   const Eigen::Matrix3d h_inverse = h.inverse();
   double sum = 0.0;
@@ -176,7 +175,7 @@ RC_GTEST_PROP(HomographyFromPoints, ExactDataGiveTheTruth, (std::uint64_t seed))
   const auto h = homographyFromPoints(scene.pairs);
   RC_ASSERT(h.has_value());
   RC_ASSERT(std::abs(h->norm() - 1.0) < 1e-12);
-  RC_ASSERT(totalError(*h, scene.pairs) < 1e-14);
+  RC_ASSERT(totalTransferError(*h, scene.pairs) < 1e-14);
   // The truth's sign gives points in view a positive third coordinate: no comparison up to sign.
   RC_ASSERT(points < 12 || (*h - scene.homography).norm() < 1e-8);
 }
@@ -185,7 +184,7 @@ TEST(HomographyFromPoints, FourPointsAreMetExactly)
 {
   const auto h = homographyFromPoints(goodSample());
   ASSERT_TRUE(h);
-  EXPECT_LT(totalError(*h, goodSample()), 1e-18);
+  EXPECT_LT(totalTransferError(*h, goodSample()), 1e-18);
 }
 
 TEST(HomographyFromPoints, SignIsPositiveForPointsInView)
@@ -324,9 +323,9 @@ TEST(RefineHomography, LowersTheErrorAndGetsNearTheTruth)
     const auto linear = homographyFromPoints(scene.pairs);
     ASSERT_TRUE(linear);
     const Eigen::Matrix3d refined = refineHomography(*linear, scene.pairs);
-    const double error = totalError(refined, scene.pairs);
-    EXPECT_LT(error, totalError(*linear, scene.pairs));
-    EXPECT_LT(error, totalError(scene.homography, scene.pairs));
+    const double error = totalTransferError(refined, scene.pairs);
+    EXPECT_LT(error, totalTransferError(*linear, scene.pairs));
+    EXPECT_LT(error, totalTransferError(scene.homography, scene.pairs));
     EXPECT_LT(rmsDistance(refined, scene.homography), 1.0);
     EXPECT_NEAR(refined.norm(), 1.0, 1e-12);
   }
@@ -342,7 +341,7 @@ TEST(RefineHomography, ReachesTheSameMinimumFromAPoorStart)
     shift(1, 0) = 0.03;
     const Eigen::Matrix3d good = refineHomography(*homographyFromPoints(scene.pairs), scene.pairs);
     const Eigen::Matrix3d poor = refineHomography(shift * scene.homography, scene.pairs);
-    EXPECT_NEAR(totalError(poor, scene.pairs), totalError(good, scene.pairs), 1e-6);
+    EXPECT_NEAR(totalTransferError(poor, scene.pairs), totalTransferError(good, scene.pairs), 1e-6);
     EXPECT_LT(rmsDistance(good, poor), 1e-3);
   }
 }

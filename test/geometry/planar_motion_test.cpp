@@ -5,6 +5,7 @@
 #include "support/level_cameras.h"
 #include "support/synthetic_scene.h"
 #include "view_servo/geometry/fundamental.h"
+#include "view_servo/parameters/numbers.h"
 
 #include <gtest/gtest.h>
 #include <rapidcheck/gtest.h>
@@ -26,9 +27,7 @@ using test::levelCamera;
 using test::onFloor;
 using test::seenBy;
 
-constexpr double NOT_A_NUMBER = std::numeric_limits<double>::quiet_NaN();
 constexpr double FOCAL_LENGTH = 520.0;  // [px]
-constexpr double DEGREE = M_PI / 180.0;
 
 /** A reference camera and where it is in the current one, which stands anywhere. */
 struct TwoCameras

@@ -1,6 +1,7 @@
 // Copyright (c) 2026, the view_servo authors
 // SPDX-License-Identifier: BSD-3-Clause
 #include "view_servo/geometry/planar_pose.h"
+#include "view_servo/parameters/numbers.h"
 
 #include "support/level_cameras.h"
 #include "support/synthetic_scene.h"
@@ -11,7 +12,6 @@
 
 #include <cmath>
 #include <cstdint>
-#include <limits>
 #include <stdexcept>
 
 namespace view_servo
@@ -25,9 +25,6 @@ using test::difference;
 using test::levelCamera;
 using test::onFloor;
 using test::seenBy;
-
-constexpr double NOT_A_NUMBER = std::numeric_limits<double>::quiet_NaN();
-constexpr double DEGREE = M_PI / 180.0;
 
 /** Base from the optical frame of a camera that is turned to the left, tilted down and rolled [rad]. */
 Eigen::Isometry3d mounted(double x, double y, double yaw, double down, double roll)

@@ -56,7 +56,7 @@ protected:
 TEST_F(RecordBagImagesTest, AreWrittenWithTheirPoses)
 {
   ASSERT_EQ(run(arguments()).status, 0);
-  const std::map<std::string, int> expected{ { CAMERA_INFOS, 2 }, { IMAGES, 2 }, { TRUTH, 2 } };
+  const std::map<std::string, int> expected{ { CAMERA_INFOS, 2 }, { IMAGES, 2 }, { TRUTHS, 2 } };
   EXPECT_EQ(topicsOf(out_), expected);
   const std::vector<Image> images = messagesOf<Image>(out_, IMAGES);
   EXPECT_EQ(toGrey(images[1], "image").size(), cv::Size(80, 60));
@@ -67,7 +67,7 @@ TEST_F(RecordBagImagesTest, AreWrittenWithTheirPoses)
   EXPECT_EQ(info.K[0], 50.0);
   EXPECT_EQ(info.P[6], 29.0);
   EXPECT_EQ(info.width, 80U);
-  const Eigen::Isometry3d pose = sim::toIsometry(messagesOf<Truth>(out_, TRUTH)[1].pose);
+  const Eigen::Isometry3d pose = sim::toIsometry(messagesOf<Truth>(out_, TRUTHS)[1].pose);
   EXPECT_TRUE(pose.translation().isApprox(Eigen::Vector3d(1.0, 2.0, 3.0)));
   EXPECT_TRUE(pose.linear().col(2).isApprox(Eigen::Vector3d::UnitX()));
   const std::string bytes = readText(out_);
@@ -107,10 +107,10 @@ TEST_F(RecordBagImagesTest, AreThoseOfARealWalk)
   }
   ASSERT_EQ(run({ "--images", std::string(data) + "/hololens_indoor", out_ }).status, 0);
   EXPECT_EQ(topicsOf(out_).at(IMAGES), 94);
-  EXPECT_EQ(topicsOf(out_).at(TRUTH), 94);
+  EXPECT_EQ(topicsOf(out_).at(TRUTHS), 94);
   EXPECT_LT(std::filesystem::file_size(out_), 15'000'000U);
   // The folder's own relative pose of two images, first in its list of pairs: X_6 = T X_1.
-  const std::vector<Truth> truths = messagesOf<Truth>(out_, TRUTH);
+  const std::vector<Truth> truths = messagesOf<Truth>(out_, TRUTHS);
   const Eigen::Isometry3d relative = sim::toIsometry(truths[5].pose).inverse() * sim::toIsometry(truths[0].pose);
   EXPECT_LT((relative.translation() - Eigen::Vector3d(0.13428, 0.10470, -0.29566)).norm(), 2e-4);
 }

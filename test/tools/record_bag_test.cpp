@@ -58,14 +58,14 @@ TEST_F(RecordBagTest, HasTheTopicsOfANomad)
 {
   const std::string bag = record(nomad_);
   // 2 s, both ends included.
-  const std::map<std::string, int> expected{ { CAMERA_INFOS, 9 }, { IMAGES, 9 }, { ODOMETRY, 41 },
-                                             { TF, 41 },          { TRUTH, 41 }, { TF_STATIC, 1 } };
+  const std::map<std::string, int> expected{ { CAMERA_INFOS, 9 }, { IMAGES, 9 },  { ODOMETRY, 41 },
+                                             { TF, 41 },          { TRUTHS, 41 }, { TF_STATIC, 1 } };
   EXPECT_EQ(topicsOf(bag), expected);
 
   const std::vector<Image> images = messagesOf<Image>(bag, IMAGES);
   const std::vector<CameraInfo> infos = messagesOf<CameraInfo>(bag, CAMERA_INFOS);
   std::map<ros::Time, int> truths;
-  for (const Truth& truth : messagesOf<Truth>(bag, TRUTH))
+  for (const Truth& truth : messagesOf<Truth>(bag, TRUTHS))
   {
     ++truths[truth.header.stamp];
     EXPECT_EQ(truth.header.frame_id, "world");
@@ -122,7 +122,7 @@ TEST_F(RecordBagTest, KeepsTheStaticTransformForThoseWhoComeLater)
 TEST_F(RecordBagTest, FollowsTheTrajectory)
 {
   const sim::World world = sim::readWorld(nomad_);
-  for (const Truth& truth : messagesOf<Truth>(record(nomad_), TRUTH))
+  for (const Truth& truth : messagesOf<Truth>(record(nomad_), TRUTHS))
   {
     const double time = 5.0 + (truth.header.stamp - ros::Time(1000.0)).toSec();
     const Eigen::Isometry3d wanted = sim::poseAt(world.trajectory("way"), time) * world.camera_on_base;
@@ -185,7 +185,7 @@ TEST_F(RecordBagTest, OdometryAgreesWithTheTruth)
     expectNear(sim::toIsometry(odometry.pose.pose) * camera_on_base, cameras.at(odometry.header.stamp),
                odometry.header.stamp);
   }
-  const std::vector<Truth> truths = messagesOf<Truth>(bag, TRUTH);
+  const std::vector<Truth> truths = messagesOf<Truth>(bag, TRUTHS);
   const Eigen::Isometry3d first = sim::toIsometry(truths.front().pose);
   for (std::size_t i = 1; i < truths.size(); ++i)
   {
@@ -211,13 +211,13 @@ TEST_F(RecordBagTest, HasTheTopicsOfAPuma)
 {
   const std::string bag = record(puma_);
   const std::map<std::string, int> expected{
-    { CAMERA_INFOS, 9 }, { IMAGES, 9 }, { JOINT_STATES, 41 }, { TF, 41 }, { TRUTH, 41 }
+    { CAMERA_INFOS, 9 }, { IMAGES, 9 }, { JOINT_STATES, 41 }, { TF, 41 }, { TRUTHS, 41 }
   };
   EXPECT_EQ(topicsOf(bag), expected);
 
   const sim::World world = sim::readWorld(puma_);
   std::map<ros::Time, Eigen::Isometry3d> truths;
-  for (const Truth& truth : messagesOf<Truth>(bag, TRUTH))
+  for (const Truth& truth : messagesOf<Truth>(bag, TRUTHS))
   {
     const double time = (truth.header.stamp - ros::Time(1000.0)).toSec();
     const Eigen::Isometry3d wanted = sim::poseAt(world.trajectory("way"), time);
@@ -275,7 +275,7 @@ TEST_F(RecordBagTest, TakesRatesAndStart)
   const std::map<std::string, int> counts = topicsOf(bag);
   EXPECT_EQ(counts.at(IMAGES), 7);
   EXPECT_EQ(counts.at(ODOMETRY), 81);
-  EXPECT_EQ(counts.at(TRUTH), 81 + 4) << "at each image and each odometry";
+  EXPECT_EQ(counts.at(TRUTHS), 81 + 4) << "at each image and each odometry";
   EXPECT_EQ(messagesOf<Image>(bag, IMAGES).front().header.stamp, ros::Time(12.5));
   EXPECT_EQ(messagesOf<Odometry>(bag, ODOMETRY).back().header.stamp, ros::Time(14.5));
 }

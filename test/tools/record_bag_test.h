@@ -2,6 +2,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include "view_servo/parameters/numbers.h"
+
 #include "support/program_run.h"
 #include "support/temporary_directory.h"
 #include "support/text_file.h"
@@ -18,7 +20,6 @@
 #include <sensor_msgs/JointState.h>
 #include <tf2_msgs/TFMessage.h>
 
-#include <cmath>
 #include <filesystem>
 #include <map>
 #include <string>
@@ -39,13 +40,11 @@ using Truth = geometry_msgs::PoseStamped;
 
 inline const std::string IMAGES = "/camera/image_raw";
 inline const std::string CAMERA_INFOS = "/camera/camera_info";
-inline const std::string TRUTH = "/ground_truth";
+inline const std::string TRUTHS = "/ground_truth";
 inline const std::string ODOMETRY = "/odom";
 inline const std::string JOINT_STATES = "/joint_states";
 inline const std::string TF = "/tf";
 inline const std::string TF_STATIC = "/tf_static";
-
-constexpr double DEGREE = M_PI / 180.0;
 
 /** Ends of the camera's entry are left open for each test. */
 inline const std::string NOMAD_WORLD = R"(

@@ -5,13 +5,13 @@
 
 #include "support/shipped_files.h"
 #include "view_servo/geometry/homography.h"
+#include "view_servo/parameters/numbers.h"
 
 #include <gtest/gtest.h>
 #include <Eigen/Geometry>
 #include <Eigen/LU>
 
 #include <algorithm>
-#include <cmath>
 #include <stdexcept>
 #include <string>
 
@@ -20,8 +20,6 @@ namespace view_servo::sim
 namespace
 {
 using test::pumaUrdf;
-
-constexpr double DEGREE = M_PI / 180.0;
 
 /** What table 8.1 is run with. */
 ArmConditions hardConditions()

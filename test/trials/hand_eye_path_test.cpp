@@ -6,6 +6,7 @@
 
 #include "support/shipped_files.h"
 #include "view_servo/geometry/region.h"
+#include "view_servo/parameters/numbers.h"
 
 #include <gtest/gtest.h>
 #include <Eigen/Geometry>
@@ -23,7 +24,6 @@ namespace view_servo::sim
 {
 namespace
 {
-constexpr double DEGREE = M_PI / 180.0;
 constexpr double WRONG_BY = 0.010;            // hand-eye calibration [m]
 constexpr double TURNED_BY = 3.0 * DEGREE;    // likewise
 constexpr double TRANSLATION_REACHED = 1e-3;  // [m]

@@ -5,6 +5,7 @@
 
 #include "sim/visibility.h"
 #include "support/shipped_files.h"
+#include "view_servo/parameters/numbers.h"
 #include "view_servo/robust/random.h"
 
 #include <gtest/gtest.h>
@@ -20,8 +21,6 @@ namespace view_servo::sim
 {
 namespace
 {
-constexpr double DEGREE = M_PI / 180.0;
-
 World worldOf(const std::string& name)
 {
   return readWorld(test::worldFile(name));

@@ -1,5 +1,7 @@
 // Copyright (c) 2026, the view_servo authors
 // SPDX-License-Identifier: BSD-3-Clause
+#include "view_servo/parameters/numbers.h"
+
 #include "trials/route_trial.h"
 
 #include "sim/world_reader.h"
@@ -14,8 +16,6 @@ namespace view_servo::sim
 {
 namespace
 {
-constexpr double DEGREE = M_PI / 180.0;
-
 World desk()
 {
   return findWorld("desk", PACKAGE_DIR "/config/worlds");
