@@ -69,7 +69,7 @@ RouteGuide::RouteGuide(const RouteGuideParams& params, std::vector<RouteStop> st
   }
 }
 
-void RouteGuide::see(const HomingReport& report, const PlanarPose& base)
+void RouteGuide::addReport(const HomingReport& report, const PlanarPose& base)
 {
   found_ = report.state == HomingState::APPROACHING || report.state == HomingState::NEAR ||
            report.state == HomingState::DOCKING || report.state == HomingState::ARRIVED;
@@ -100,7 +100,7 @@ void RouteGuide::see(const HomingReport& report, const PlanarPose& base)
   due_ = !last() && (near || in_place);
 }
 
-void RouteGuide::move(const PlanarPose& base)
+void RouteGuide::addOdometry(const PlanarPose& base)
 {
   if (base_ && !found_)
   {

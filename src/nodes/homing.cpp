@@ -62,7 +62,7 @@ public:
                 {},
                 {},
                 [this](const HomingOutcome& outcome) {
-                  if (storeStructure(homing_.store(), outcome))
+                  if (storeStructure(homing_.viewStore(), outcome))
                   {
                     context_.runLocked("the end of a lesson", [&] { endLesson(outcome.task->view); });
                   }
@@ -71,7 +71,7 @@ public:
                   watchView(frame);
                 } })
   {
-    homing_.want(params.view, "");
+    homing_.expectView(params.view, "");
     context.listen<WantedView>("learn_view", 1, [this](const WantedView::ConstPtr& m) { learn(m->view); });
   }
 
@@ -88,7 +88,7 @@ public:
     {
       throw std::invalid_argument("the goal names no view, and ~view is not set");
     }
-    const LearntView stored = loadLearntView(homing_.store(), view);
+    const LearntView stored = loadLearntView(homing_.viewStore(), view);
     const CameraFrame frame = homing_.waitForInputs(view);
     HomingParams homing = params_.homing;
     if (goal.step > 0.0)
@@ -110,7 +110,7 @@ public:
   void end()
   {
     homing_.setTask(nullptr);
-    homing_.want(idle_view_.name(), "");
+    homing_.expectView(idle_view_.name(), "");
   }
 
   std::string idleView() const
@@ -126,7 +126,7 @@ public:
   }
   Velocity wanted(double /*time*/) const
   {
-    return homing_.wanted();
+    return homing_.velocity();
   }
   void sent(double time, const Velocity& velocity)
   {
@@ -157,13 +157,13 @@ public:
 
   void fill(HomeToViewResult& result) const
   {
-    result.final = toHeading(homing_.report(), homing_.frame());
+    result.final = toHeading(homing_.report(), homing_.baseFrame());
     result.travelled = homing_.task() ? homing_.travelled() : 0.0;
   }
 
   void fill(HomeToViewFeedback& feedback, const ServoStatus& /*status*/) const
   {
-    feedback.heading = toHeading(homing_.report(), homing_.frame());
+    feedback.heading = toHeading(homing_.report(), homing_.baseFrame());
     feedback.manoeuvre = homing_.report().manoeuvre;
   }
 
@@ -182,14 +182,14 @@ private:
     if (context_.goalId().empty())
     {
       homing_.setTask(nullptr);
-      homing_.want(idle_view_.name(), "");
+      homing_.expectView(idle_view_.name(), "");
       context_.requestIdleView(idle_view_.name());
     }
   }
 
   void endLesson(const std::string& view)
   {
-    if (idle_view_.learnt() == view)
+    if (idle_view_.toBeLearnt() == view)
     {
       learn("");
     }
@@ -199,7 +199,7 @@ private:
   {
     if (idle_view_.overdue())
     {
-      ROS_WARN_STREAM("view '" << idle_view_.learnt() << "' is not learnt: the base has not moved away from it");
+      ROS_WARN_STREAM("view '" << idle_view_.toBeLearnt() << "' is not learnt: the base has not moved away from it");
       learn("");
     }
   }
@@ -210,7 +210,7 @@ private:
     constexpr std::chrono::seconds PERIOD(1);
     constexpr double NEVER = 1e9;  // [s]
     const auto [view, lesson] =
-        context_.locked([this] { return std::pair(idle_view_.name(), !idle_view_.learnt().empty()); });
+        context_.locked([this] { return std::pair(idle_view_.name(), !idle_view_.toBeLearnt().empty()); });
     if (view.empty() || Clock::now() < next_watch_)
     {
       return;
@@ -220,7 +220,8 @@ private:
     {
       HomingParams homing = params_.homing;
       homing.dwell = lesson ? NEVER : homing.dwell;  // it begins where the view was stored
-      const std::shared_ptr<HomingTask> task = homing_.makeTask(loadLearntView(homing_.store(), view), frame, homing);
+      const std::shared_ptr<HomingTask> task =
+          homing_.makeTask(loadLearntView(homing_.viewStore(), view), frame, homing);
       task->lesson = lesson;
       context_.runLocked("the watch for a view", [&] {
         if (!homing_.task() && context_.goalId().empty() && idle_view_.name() == task->view)

@@ -4,6 +4,7 @@
 
 #include "view_servo/MatchPoints.h"
 #include "view_servo/PointMatches.h"
+#include "view_servo/parameters/numbers.h"
 #include "view_servo/ros/conversions.h"
 #include "view_servo/ros/node_base.h"
 #include "view_servo/ros/node_type_of.h"
@@ -61,7 +62,6 @@ public:
 
   static void clear(Service::Response& response)
   {
-    constexpr double NOT_A_NUMBER = std::numeric_limits<double>::quiet_NaN();
     copyRowMajor(Eigen::Matrix3d::Constant(NOT_A_NUMBER), response.model_matrix);
     response.rms_error = NOT_A_NUMBER;
   }

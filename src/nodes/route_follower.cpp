@@ -65,7 +65,7 @@ public:
                 [this] { onOdometry(); },
                 [this] { onImageOutcome(); },
                 [this](const HomingOutcome& outcome) {
-                  storeStructure(homing_.store(), outcome);
+                  storeStructure(homing_.viewStore(), outcome);
                   listenToRecognizer();
                 },
                 {} })
@@ -97,7 +97,7 @@ public:
       beginWhereTheBaseIs(task->stops);
     }
     const std::string& view = task->stops.front().view;
-    const LearntView stored = loadLearntView(homing_.store(), view);
+    const LearntView stored = loadLearntView(homing_.viewStore(), view);
     task->frame = homing_.waitForInputs(view);
     task->first = homing_.makeTask(stored, task->frame, params_.homing);
     homing_.waitForAnswer();
@@ -121,7 +121,7 @@ public:
     next_.reset();
     lost_since_.reset();
     homing_.setTask(nullptr);
-    homing_.want("", "");
+    homing_.expectView("", "");
   }
 
   static std::string idleView()
@@ -152,7 +152,7 @@ public:
   Velocity wanted(double /*time*/) const
   {
     const std::optional<Course> blind = blindCourse();
-    return blind ? homing_.follow(*blind) : homing_.wanted();
+    return blind ? homing_.follow(*blind) : homing_.velocity();
   }
   void sent(double time, const Velocity& velocity)
   {
@@ -295,7 +295,7 @@ private:
   {
     std::shared_ptr<HomingTask> task;
     const std::string fault = guarded("reading view '" + order.view + "'", [&] {
-      task = homing_.makeTask(loadLearntView(homing_.store(), order.view), order.frame, params_.homing);
+      task = homing_.makeTask(loadLearntView(homing_.viewStore(), order.view), order.frame, params_.homing);
     });
     context_.locked([&] {
       if (!guide_ || context_.goalId() != order.goal || ordered_ != order.view)
@@ -326,7 +326,7 @@ private:
   {
     if (guide_)
     {
-      guide_->move(*homing_.base());
+      guide_->addOdometry(*homing_.base());
       homing_.setDoesWithoutMatches(blindCourse().has_value());
     }
   }
@@ -337,8 +337,8 @@ private:
     {
       return;
     }
-    guide_->see(homing_.report(), *homing_.base());
-    if (guide_->due() && next_)
+    guide_->addReport(homing_.report(), *homing_.base());
+    if (guide_->isTimeToGoOn() && next_)
     {
       guide_->goOn();
       driveTo(std::exchange(next_, nullptr));
@@ -361,7 +361,7 @@ private:
     ROS_INFO_STREAM("the route goes on to view '" << guide_->view() << "', " << guide_->number() << " of "
                                                   << guide_->count());
     homing_.setTask(std::move(task));
-    homing_.want(guide_->view(), context_.goalId());
+    homing_.expectView(guide_->view(), context_.goalId());
     context_.requestNextView(guide_->view());
     lost_since_.reset();
     orderNext();

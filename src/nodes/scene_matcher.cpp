@@ -5,6 +5,7 @@
 #include "view_servo/MatchScene.h"
 #include "view_servo/SceneMatches.h"
 #include "view_servo/geometry/fundamental.h"
+#include "view_servo/parameters/numbers.h"
 #include "view_servo/ros/conversions.h"
 #include "view_servo/ros/node_base.h"
 #include "view_servo/ros/node_type_of.h"
@@ -18,7 +19,6 @@
 
 #include <algorithm>
 #include <functional>
-#include <limits>
 #include <optional>
 #include <stdexcept>
 #include <string>
@@ -95,7 +95,6 @@ void addMotion(SceneResult& result, const MatchedImage& reference, const Matched
 template <typename Fields>
 void clearFields(Fields& fields)
 {
-  constexpr double NOT_A_NUMBER = std::numeric_limits<double>::quiet_NaN();
   std::fill(fields.model_matrix.begin(), fields.model_matrix.end(), NOT_A_NUMBER);
   std::fill(fields.epipole_reference.begin(), fields.epipole_reference.end(), NOT_A_NUMBER);
   std::fill(fields.epipole_current.begin(), fields.epipole_current.end(), NOT_A_NUMBER);

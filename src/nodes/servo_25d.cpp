@@ -8,6 +8,7 @@
 #include "view_servo/control/joint_guard.h"
 #include "view_servo/control/servo_25d.h"
 #include "view_servo/parameters/error_text.h"
+#include "view_servo/parameters/numbers.h"
 #include "view_servo/ros/arm_conversions.h"
 #include "view_servo/ros/conversions.h"
 #include "view_servo/ros/driver_node.h"
@@ -27,7 +28,6 @@
 #include <cmath>
 #include <cstddef>
 #include <initializer_list>
-#include <limits>
 #include <memory>
 #include <optional>
 #include <stdexcept>
@@ -39,8 +39,6 @@ namespace view_servo
 {
 namespace
 {
-constexpr double NOT_A_NUMBER = std::numeric_limits<double>::quiet_NaN();
-
 /** One of a goal's views. */
 struct ServoStage
 {
@@ -184,7 +182,7 @@ public:
     {
       stored.push_back(store_.load(view.view));
     }
-    context_.locked([&] { answer_.want(stored.front().name, context_.goalId()); });
+    context_.locked([&] { answer_.expect(stored.front().name, context_.goalId()); });
     context_.requestView(stored.front().name);
     // Only one that has come since: the camera may be another than it was.
     context_.locked([this] { info_.reset(); });
@@ -221,7 +219,7 @@ public:
   void end()
   {
     task_.reset();
-    answer_.want("", "");
+    answer_.expect("", "");
   }
 
   std::string idleView() const
@@ -390,7 +388,7 @@ private:
     task_->distance_known = task_->found = task_->moves = false;
     task_->acquiring = "looks for the view";
     joints_.clearStuck();
-    answer_.want(task_->stage().view, context_.goalId());
+    answer_.expect(task_->stage().view, context_.goalId());
     context_.requestNextView(task_->stage().view);
     homographies_.setNeeded(false);
   }

@@ -5,6 +5,7 @@
 #include "view_servo/ServoStatus.h"
 #include "view_servo/geometry/camera_warp.h"
 #include "view_servo/geometry/region.h"
+#include "view_servo/parameters/numbers.h"
 #include "view_servo/ros/conversions.h"
 
 #include <ros/console.h>
@@ -13,15 +14,12 @@
 
 #include <cmath>
 #include <cstdint>
-#include <limits>
 #include <stdexcept>
 
 namespace view_servo
 {
 namespace
 {
-constexpr double NOT_A_NUMBER = std::numeric_limits<double>::quiet_NaN();
-
 std::uint8_t toStatusState(ServoState state)
 {
   switch (state)

@@ -3,6 +3,7 @@
 #include "view_servo/ros/conversions.h"
 
 #include "view_servo/images/image_io.h"
+#include "view_servo/parameters/numbers.h"
 
 #include <cv_bridge/cv_bridge.h>
 #include <sensor_msgs/image_encodings.h>
@@ -13,14 +14,11 @@
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
-#include <limits>
 
 namespace view_servo
 {
 namespace
 {
-constexpr double NOT_A_NUMBER = std::numeric_limits<double>::quiet_NaN();
-
 /** A homography message that says nothing. */
 Homography unknownHomography(const std::string& view, const std_msgs::Header& header)
 {

@@ -6,7 +6,7 @@
 
 namespace view_servo
 {
-void ViewAnswer::want(const std::string& view, const std::string& goal)
+void ViewAnswer::expect(const std::string& view, const std::string& goal)
 {
   view_ = view;
   goal_ = goal;

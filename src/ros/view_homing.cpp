@@ -86,7 +86,7 @@ ViewHoming::ViewHoming(DriverContext& context, const HomingDriverParams& params,
 
 CameraFrame ViewHoming::waitForInputs(const std::string& view)
 {
-  context_.locked([&] { want(view, context_.goalId()); });
+  context_.locked([&] { expectView(view, context_.goalId()); });
   context_.requestView(view);
   // Only an image that has come since: the camera may be another than it was.
   CameraFrame before;
@@ -123,10 +123,10 @@ std::shared_ptr<HomingTask> ViewHoming::makeTask(const LearntView& stored, const
 
 // ------------------------------------------------------------------------------------------------ the task, control
 
-void ViewHoming::want(const std::string& view, const std::string& goal)
+void ViewHoming::expectView(const std::string& view, const std::string& goal)
 {
-  points_.want(view, goal);
-  lines_.want(view, goal);
+  points_.expect(view, goal);
+  lines_.expect(view, goal);
 }
 
 void ViewHoming::setTask(std::shared_ptr<HomingTask> task)

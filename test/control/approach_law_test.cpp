@@ -3,6 +3,7 @@
 #include "view_servo/control/approach_law.h"
 
 #include "view_servo/control/velocity_limiter.h"
+#include "view_servo/parameters/numbers.h"
 #include "view_servo/robust/random.h"
 
 #include <gtest/gtest.h>
@@ -18,7 +19,6 @@ namespace view_servo
 {
 namespace
 {
-constexpr double DEGREE = M_PI / 180.0;
 constexpr double DT = 0.02;              // between two commands, and two readings of odometry [s]
 constexpr int IMAGE_EVERY = 5;           // commands
 constexpr double MOST_TOLERANCE = 0.01;  // [m]

@@ -3,6 +3,7 @@
 #include "view_servo/control/arrival_detector.h"
 
 #include "support/textured_plane.h"
+#include "view_servo/parameters/numbers.h"
 #include "view_servo/robust/random.h"
 
 #include <gtest/gtest.h>
@@ -21,8 +22,6 @@ namespace view_servo
 {
 namespace
 {
-constexpr double NOT_A_NUMBER = std::numeric_limits<double>::quiet_NaN();
-
 double similarity(const cv::Mat& a, const cv::Mat& b)
 {
   return gradientSimilarity(gradientMagnitude(a), gradientMagnitude(b));

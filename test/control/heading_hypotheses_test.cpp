@@ -1,6 +1,7 @@
 // Copyright (c) 2026, the view_servo authors
 // SPDX-License-Identifier: BSD-3-Clause
 #include "view_servo/control/heading_hypotheses.h"
+#include "view_servo/parameters/numbers.h"
 
 #include "support/level_matches.h"
 
@@ -23,8 +24,6 @@ using test::inCurrentCamera;
 using test::inImage;
 using test::noisy;
 using test::randomPosition;
-
-constexpr double DEGREE = M_PI / 180.0;
 
 /** Matches of points 1.5 to 6 m away from the reference camera. */
 void addMatches(const PlanarPose& reference_in_current, int count, Rng& rng, Correspondences& matches)

@@ -4,6 +4,7 @@
 
 #include "support/level_matches.h"
 #include "view_servo/geometry/planar_pose.h"
+#include "view_servo/parameters/numbers.h"
 
 #include <gtest/gtest.h>
 
@@ -22,7 +23,6 @@ namespace view_servo
 {
 namespace
 {
-constexpr double DEGREE = M_PI / 180.0;
 constexpr double BIN = M_PI / 180.0;  // of the default parameters
 
 /**

@@ -7,6 +7,7 @@
 #include "support/textured_plane.h"
 #include "view_servo/control/homing.h"
 #include "view_servo/control/velocity_limiter.h"
+#include "view_servo/parameters/numbers.h"
 #include "view_servo/robust/random.h"
 
 #include <Eigen/Core>
@@ -14,7 +15,6 @@
 #include <Eigen/LU>
 #include <opencv2/core.hpp>
 
-#include <cmath>
 #include <cstddef>
 #include <cstdint>
 #include <memory>
@@ -25,7 +25,6 @@ namespace view_servo
 {
 /** @file A base that homes on a view before walls whose homographies are known. */
 
-constexpr double DEGREE = M_PI / 180.0;
 constexpr double CONTROL_PERIOD =
     0.05;  // [s]; odometry comes as often, every fourth time an image, every tenth matches
 

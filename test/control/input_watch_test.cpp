@@ -62,7 +62,7 @@ TEST(InputWatch, AgeIsTheTimeSinceItWasFed)
   EXPECT_LE(age, since(before));
   // Fed, it is no older than the moment before.
   const Clock::time_point fed = Clock::now();
-  watch.feed();
+  watch.restart();
   const double new_age = watch.age();
   EXPECT_LE(new_age, since(fed));
 }
@@ -77,7 +77,7 @@ TEST(InputWatch, FreshInputMakesItGoodAgain)
   {
     ASSERT_TRUE(becomesStale(watch));
     const Clock::time_point fed = Clock::now();
-    watch.feed();
+    watch.restart();
     const bool stale = watch.stale();
     looked_in_time = since(fed) < TIMEOUT;
     EXPECT_FALSE(looked_in_time && stale);

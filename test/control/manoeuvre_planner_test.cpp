@@ -1,6 +1,7 @@
 // Copyright (c) 2026, the view_servo authors
 // SPDX-License-Identifier: BSD-3-Clause
 #include "view_servo/control/manoeuvre_planner.h"
+#include "view_servo/parameters/numbers.h"
 
 #include <gtest/gtest.h>
 #include <rapidcheck/gtest.h>
@@ -11,8 +12,6 @@ namespace view_servo
 {
 namespace
 {
-constexpr double DEGREE = M_PI / 180.0;
-
 double all(const PlanarPose& /*base_in_goal*/)
 {
   return 1.0;

@@ -83,27 +83,27 @@ TEST(RouteGuide, GoesOnNearAViewThatIsNotTheLast)
   EXPECT_EQ(guide.next(), "b");
   EXPECT_FALSE(guide.blindCourse()) << "nothing is known yet";
   const PlanarPose far = compose(at_a, { -0.6, 0.0, 0.0 });
-  guide.see(trackedReport(far, at_a, true), far);
-  EXPECT_FALSE(guide.due());
+  guide.addReport(trackedReport(far, at_a, true), far);
+  EXPECT_FALSE(guide.isTimeToGoOn());
   const PlanarPose near = compose(at_a, { -0.29, 0.0, 0.0 });
-  guide.see(trackedReport(near, at_a, false), near);
-  EXPECT_FALSE(guide.due()) << "how far it is in metres is not known";
+  guide.addReport(trackedReport(near, at_a, false), near);
+  EXPECT_FALSE(guide.isTimeToGoOn()) << "how far it is in metres is not known";
   const PlanarPose turned = compose(at_a, { -0.1, 0.0, 0.2 });
-  guide.see(trackedReport(turned, at_a, true), turned);
-  EXPECT_FALSE(guide.due());
-  guide.see(trackedReport(near, at_a, true), near);
-  ASSERT_TRUE(guide.due());
+  guide.addReport(trackedReport(turned, at_a, true), turned);
+  EXPECT_FALSE(guide.isTimeToGoOn());
+  guide.addReport(trackedReport(near, at_a, true), near);
+  ASSERT_TRUE(guide.isTimeToGoOn());
   guide.goOn();
   EXPECT_EQ(guide.view(), "b");
-  EXPECT_FALSE(guide.due());
+  EXPECT_FALSE(guide.isTimeToGoOn());
 
   const PlanarPose at_b = compose(at_a, { 0.5, 0.0, 0.0 });
-  guide.see(trackedReport(at_b, at_b, true), at_b);
-  ASSERT_TRUE(guide.due());
+  guide.addReport(trackedReport(at_b, at_b, true), at_b);
+  ASSERT_TRUE(guide.isTimeToGoOn());
   guide.goOn();
   const PlanarPose at_c = compose(at_a, { 1.0, 0.1, 0.2 });
-  guide.see(trackedReport(at_c, at_c, true), at_c);
-  EXPECT_FALSE(guide.due()) << "the last view is homed to";
+  guide.addReport(trackedReport(at_c, at_c, true), at_c);
+  EXPECT_FALSE(guide.isTimeToGoOn()) << "the last view is homed to";
   EXPECT_TRUE(guide.last());
   EXPECT_THROW(guide.goOn(), std::logic_error);
 }
@@ -115,11 +115,11 @@ TEST(RouteGuide, GoesOnWhereThePointsAreInPlace)
   HomingReport report = trackedReport(base, compose(base, { 2.0, 0.0, 0.0 }), false);  // by a wrong scale
   report.state = HomingState::DOCKING;
   report.displacement = 20.0;
-  guide.see(report, base);
-  EXPECT_FALSE(guide.due());
+  guide.addReport(report, base);
+  EXPECT_FALSE(guide.isTimeToGoOn());
   report.displacement = 4.0;
-  guide.see(report, base);
-  ASSERT_TRUE(guide.due());
+  guide.addReport(report, base);
+  ASSERT_TRUE(guide.isTimeToGoOn());
   guide.goOn();
   const std::optional<Course> course = guide.blindCourse();
   ASSERT_TRUE(course);
@@ -135,8 +135,8 @@ TEST(RouteGuide, LeadsByOdometryWithinBounds)
   {
     RouteGuide guide(params, makeRoute().stops, 0.1);
     const PlanarPose at_a{ 10.0, 5.0, 0.5 };
-    guide.move(at_a);
-    guide.see(trackedReport(at_a, at_a, true), at_a);
+    guide.addOdometry(at_a);
+    guide.addReport(trackedReport(at_a, at_a, true), at_a);
     EXPECT_FALSE(guide.blindCourse()) << "homing knows the way";
     guide.goOn();
     const std::optional<Course> course = guide.blindCourse();
@@ -147,11 +147,11 @@ TEST(RouteGuide, LeadsByOdometryWithinBounds)
     EXPECT_NEAR(course->view.yaw, expected.yaw, 1e-12);
     EXPECT_EQ(course->max_speed, 0.1);
     const PlanarPose once = compose(at_a, step);
-    guide.move(once);
+    guide.addOdometry(once);
     EXPECT_TRUE(guide.blindCourse());
-    guide.see(HomingReport(), once);  // not found yet
+    guide.addReport(HomingReport(), once);  // not found yet
     EXPECT_TRUE(guide.blindCourse());
-    guide.move(compose(once, step));
+    guide.addOdometry(compose(once, step));
     EXPECT_FALSE(guide.blindCourse()) << "far enough";
   }
 }
@@ -160,11 +160,11 @@ TEST(RouteGuide, GoesToAnyViewOfTheWay)
 {
   RouteGuide guide(RouteGuideParams(), makeRoute().stops, 0.1);
   const PlanarPose at_a{ 10.0, 5.0, 0.5 };
-  guide.see(trackedReport(at_a, at_a, true), at_a);
+  guide.addReport(trackedReport(at_a, at_a, true), at_a);
   guide.goTo("c");
   EXPECT_EQ(guide.view(), "c");
   EXPECT_TRUE(guide.last());
-  EXPECT_FALSE(guide.due());
+  EXPECT_FALSE(guide.isTimeToGoOn());
   EXPECT_FALSE(guide.blindCourse()) << "where it is is not known";
   EXPECT_THROW(guide.goTo("x"), std::logic_error);
 }
@@ -173,13 +173,13 @@ TEST(RouteGuide, SaysHowTheBaseIsPlacedOnTheLine)
 {
   RouteGuide guide(RouteGuideParams(), makeRoute().stops, 0.1);
   const PlanarPose at_a{ 10.0, 5.0, 0.5 };
-  guide.see(trackedReport(at_a, at_a, true), at_a);
+  guide.addReport(trackedReport(at_a, at_a, true), at_a);
   EXPECT_TRUE(std::isnan(guide.deviation(at_a).sideways)) << "no line leads to the first view";
   guide.goOn();
   const RouteGuide::Deviation deviation = guide.deviation(compose(at_a, { 0.2, 0.07, -0.03 }));
   EXPECT_NEAR(deviation.sideways, 0.07, 1e-12);
   EXPECT_NEAR(deviation.yaw, -0.03, 1e-12);
-  guide.see(trackedReport(at_a, compose(at_a, { 0.5, 0.0, 0.0 }), true), at_a);
+  guide.addReport(trackedReport(at_a, compose(at_a, { 0.5, 0.0, 0.0 }), true), at_a);
   guide.goOn();
   const PlanarPose half = compose(at_a, { 0.75, 0.05, 0.1 });
   EXPECT_NEAR(guide.deviation(half).sideways, 0.0, 1e-12);

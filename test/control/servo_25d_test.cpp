@@ -1,6 +1,7 @@
 // Copyright (c) 2026, the view_servo authors
 // SPDX-License-Identifier: BSD-3-Clause
 #include "view_servo/control/servo_25d.h"
+#include "view_servo/parameters/numbers.h"
 
 #include "support/cameras.h"
 #include "support/synthetic_scene.h"
@@ -23,7 +24,6 @@ namespace view_servo
 {
 namespace
 {
-constexpr double DEGREE = M_PI / 180.0;
 constexpr double WIDTH = 640.0;
 constexpr double HEIGHT = 480.0;
 constexpr double DISTANCE = 0.5;  // [m]

@@ -1,6 +1,7 @@
 // Copyright (c) 2026, the view_servo authors
 // SPDX-License-Identifier: BSD-3-Clause
 #include "view_servo/control/velocity_limiter.h"
+#include "view_servo/parameters/numbers.h"
 
 #include "support/synthetic_scene.h"
 
@@ -18,7 +19,6 @@ namespace view_servo
 namespace
 {
 constexpr double DT = 0.05;  // [s]
-constexpr double NOT_A_NUMBER = std::numeric_limits<double>::quiet_NaN();
 
 /** What remains after many steps. */
 BaseVelocity settled(BaseVelocityLimiter& limiter, const BaseVelocity& wanted)

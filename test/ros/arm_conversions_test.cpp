@@ -1,6 +1,7 @@
 // Copyright (c) 2026, the view_servo authors
 // SPDX-License-Identifier: BSD-3-Clause
 #include "view_servo/ros/arm_conversions.h"
+#include "view_servo/parameters/numbers.h"
 
 #include <gtest/gtest.h>
 
@@ -15,7 +16,6 @@ namespace view_servo
 {
 namespace
 {
-constexpr double NOT_A_NUMBER = std::numeric_limits<double>::quiet_NaN();
 constexpr double INFINITE = std::numeric_limits<double>::infinity();
 
 Homography example()

@@ -9,6 +9,7 @@
 #include "support/temporary_directory.h"
 #include "support/text_file.h"
 #include "view_servo/geometry/homography.h"
+#include "view_servo/parameters/numbers.h"
 #include "view_servo/robust/quantile.h"
 #include "view_servo/views/line_view_matcher.h"
 #include "view_servo/views/point_view_matcher.h"
@@ -28,8 +29,6 @@ namespace test
 {
 namespace
 {
-constexpr double DEGREE = M_PI / 180.0;
-
 /** An arm above a picture on the floor, its only plane. */
 const std::string PLANE = R"(
 robot: {kind: puma}

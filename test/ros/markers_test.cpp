@@ -1,6 +1,7 @@
 // Copyright (c) 2026, the view_servo authors
 // SPDX-License-Identifier: BSD-3-Clause
 #include "view_servo/ros/markers.h"
+#include "view_servo/parameters/numbers.h"
 
 #include <gtest/gtest.h>
 
@@ -17,8 +18,6 @@ namespace
 {
 using visualization_msgs::Marker;
 using visualization_msgs::MarkerArray;
-
-constexpr double NOT_A_NUMBER = std::numeric_limits<double>::quiet_NaN();
 
 Camera pinhole()
 {

@@ -38,7 +38,7 @@ TEST_F(ViewAnswerTest, ComesOfTheGoalOrOfSomebodyWhoChoseTheSameView)
 {
   for (const std::string goal : { "goal 2", "" })
   {
-    answer_.want("dock", "goal 2");
+    answer_.expect("dock", "goal 2");
     EXPECT_NE(answer_.missing().find("no matches of view 'dock' have come on '/point_matches'"), std::string::npos);
     EXPECT_TRUE(answer_.add(about("dock", goal)));
     EXPECT_TRUE(answer_.came());
@@ -48,7 +48,7 @@ TEST_F(ViewAnswerTest, ComesOfTheGoalOrOfSomebodyWhoChoseTheSameView)
 
 TEST_F(ViewAnswerTest, IsNotThatOfAFormerGoal)
 {
-  answer_.want("dock", "goal 2");
+  answer_.expect("dock", "goal 2");
   EXPECT_FALSE(answer_.add(about("dock", "goal 1")));
   EXPECT_FALSE(answer_.add(about("dock", "goal 1", "it is gone")));
   EXPECT_FALSE(answer_.came());
@@ -58,7 +58,7 @@ TEST_F(ViewAnswerTest, IsNotThatOfAFormerGoal)
 
 TEST_F(ViewAnswerTest, NamesAnotherView)
 {
-  answer_.want("dock", "goal 2");
+  answer_.expect("dock", "goal 2");
   EXPECT_FALSE(answer_.add(about("door", "")));
   EXPECT_NE(answer_.missing().find("are of view 'door', not of 'dock'"), std::string::npos);
   EXPECT_TRUE(answer_.add(about("dock", "")));
@@ -67,7 +67,7 @@ TEST_F(ViewAnswerTest, NamesAnotherView)
 
 TEST_F(ViewAnswerTest, RefusesForAReason)
 {
-  answer_.want("dock", "goal 2");
+  answer_.expect("dock", "goal 2");
   EXPECT_FALSE(answer_.add(about("dock", "goal 2", "there is no such view")));
   EXPECT_NE(answer_.refusal().find("there is no such view"), std::string::npos);
   EXPECT_THROW(missingAnswer({ &answer_ }), std::runtime_error);
@@ -78,7 +78,7 @@ TEST_F(ViewAnswerTest, RefusesForAReason)
 TEST_F(ViewAnswerTest, OneOfSeveralIsEnough)
 {
   ViewAnswer other("matches", "/line_matches");
-  answer_.want("dock", "goal");
+  answer_.expect("dock", "goal");
   other.want("dock", "goal");
   answer_.add(about("dock", "goal", "too small"));
   EXPECT_NE(missingAnswer({ &answer_, &other }), "");

@@ -23,12 +23,12 @@ public:
   }
 
   /** Input has come. */
-  void feed()
+  void restart()
   {
     last_ = Clock::now();
   }
 
-  /** Time since the input was last fed, or since this object was made [s]. */
+  /** Time since restart() was last called, or since this object was made [s]. */
   double age() const
   {
     return std::chrono::duration<double>(Clock::now() - last_.load()).count();

@@ -77,12 +77,12 @@ public:
   }
 
   /** To be called after each image, with what homing to view() knows and the base's pose. */
-  void see(const HomingReport& report, const PlanarPose& base);
+  void addReport(const HomingReport& report, const PlanarPose& base);
   /** To be called with each reading of odometry. */
-  void move(const PlanarPose& base);
+  void addOdometry(const PlanarPose& base);
 
   /** Whether the base is near enough to view() to go on to the next one; never at the last. */
-  bool due() const
+  bool isTimeToGoOn() const
   {
     return due_;
   }

@@ -32,7 +32,7 @@ struct CameraInputParams
 {
   std::string image_transport = "raw";  ///< how images travel; image_transport itself reads the parameter
   int queue_size = 5;          ///< images that wait for the camera_info with their stamp, and the other way round
-  double max_image_age = 1.0;  ///< an older image is not what the camera sees now [s]
+  double max_image_age = 1.0;  ///< an image older than this counts as missing [s]
 };
 
 /** Names, units, ranges and meanings of these parameters. */
@@ -80,6 +80,7 @@ public:
    * caller waits at a time, and others get what latest() gives at once: each one that waits blocks one of the spinner's
    * few threads, which also deliver the images.
    * @param patience longest wait [s].
+   * @throws ImageError when there is still no usable frame after that time; at once for a caller who does not wait.
    */
   CameraFrame latest(double patience) const;
 

@@ -58,9 +58,10 @@ class StatusOutput
 public:
   explicit StatusOutput(ros::NodeHandle& nh);
 
+  /** Publishes it if state or reason has changed, or 0.1 s after the last one while it looks for the view or drives. */
   void publish(ServoStatus status);
-  /** The status published last. */
 
+  /** The status given to publish() last, whether it was published or not. */
   const ServoStatus& last() const
   {
     return last_;

@@ -42,7 +42,7 @@ public:
     constexpr double WEIGHT = 0.3;
     constexpr double LONGEST = 0.5;  // [s]
     period_ += WEIGHT * (std::min(watch_.age(), LONGEST) - period_);
-    watch_.feed();
+    watch_.restart();
     problem_.clear();
     came_ = true;
   }
@@ -80,7 +80,7 @@ public:
   /** To be called when a goal begins: the time without input counts from now. */
   void restart()
   {
-    watch_.feed();
+    watch_.restart();
     problem_.clear();
   }
   /** Sets whether goals need this input; without a call they do. */
@@ -240,7 +240,8 @@ public:
   /**
    * Waits for something that a goal needs before it can begin. Only for a driver's prepare(), without the mutex.
    * @param missing says what is still missing, see waitUntilReady(); called without the mutex.
-   * @throws std::runtime_error with what is missing when it does not come, or when the goal has ended meanwhile.
+   * @throws std::runtime_error with what is missing when it has not come within the parameter `start_patience`, or when
+   * the goal has ended meanwhile.
    */
   void waitFor(const std::function<std::string()>& missing);
 
@@ -264,7 +265,7 @@ protected:
   DriverContext(const ros::NodeHandle& nh, const ros::NodeHandle& private_nh, bool dry_run);
   ~DriverContext() = default;
 
-  /** Whether the goal that is prepared is still wanted. The mutex is held. */
+  /** Whether the goal that is being prepared is still wanted. The mutex is held. */
   virtual bool preparing() const = 0;
 
   /** Publishes which view is wanted, and for which goal; empty: no view, no goal. */

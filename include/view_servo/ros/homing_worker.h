@@ -42,8 +42,8 @@ struct HomingTask
   std::unique_ptr<Homing> homing;        ///< only the worker's thread uses it
   bool lesson = false;                   ///< the view is to be learnt: its structure is stored without an arrival, too
   bool structure_stored = false;         ///< storeStructure() has stored the structure
-  Camera camera;                         ///< that is there now
-  Camera view_camera;                    ///< that the view was taken with
+  Camera camera;                         ///< calibration of the camera that is there now
+  Camera view_camera;                    ///< calibration of the camera that took the view
   Eigen::Isometry3d base_from_camera = Eigen::Isometry3d::Identity();  ///< the optical frame's pose in base_link
 };
 

@@ -24,7 +24,7 @@ public:
   }
 
   /** Name of the view that has to be learnt; empty: none. */
-  const std::string& learnt() const
+  const std::string& toBeLearnt() const
   {
     return learnt_;
   }

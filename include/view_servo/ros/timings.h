@@ -2,10 +2,11 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include "view_servo/parameters/numbers.h"
+
 #include <diagnostic_updater/DiagnosticStatusWrapper.h>
 
 #include <algorithm>
-#include <limits>
 #include <string>
 
 namespace view_servo
@@ -25,7 +26,6 @@ public:
   /** Adds mean and largest, NaN when there were none, under "NAME, mean [ms]" and "NAME, largest [ms]"; begins anew. */
   void report(diagnostic_updater::DiagnosticStatusWrapper& status, const std::string& name)
   {
-    constexpr double NOT_A_NUMBER = std::numeric_limits<double>::quiet_NaN();
     status.add(name + ", mean [ms]", count_ > 0 ? sum_ / count_ : NOT_A_NUMBER);
     status.add(name + ", largest [ms]", count_ > 0 ? largest_ : NOT_A_NUMBER);
     *this = Timings();

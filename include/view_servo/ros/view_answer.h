@@ -22,7 +22,7 @@ public:
   }
 
   /** Another view is wanted from now on; empty: none. @param goal id of the goal that it is wanted for. */
-  void want(const std::string& view, const std::string& goal);
+  void expect(const std::string& view, const std::string& goal);
 
   /** To be called with each message. @return whether it is about the wanted view and does not refuse it. */
   template <typename Message>
@@ -31,7 +31,7 @@ public:
     return add(message.view, message.goal, message.refused != 0, message.reason);
   }
 
-  /** The name of the wanted view, as given to want(). */
+  /** The name of the wanted view, as given to expect(). */
   const std::string& view() const
   {
     return view_;

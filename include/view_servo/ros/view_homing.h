@@ -75,12 +75,12 @@ public:
   /** The task of homing to a view. @throws std::runtime_error saying why homing by such frames cannot be. */
   std::shared_ptr<HomingTask> makeTask(const LearntView& stored, const CameraFrame& frame,
                                        const HomingParams& params) const;
-  const ViewStore& store() const
+  const ViewStore& viewStore() const
   {
     return store_;
   }
   /** Name of the base's frame. */
-  const std::string& frame() const
+  const std::string& baseFrame() const
   {
     return base_frame_;
   }
@@ -88,7 +88,7 @@ public:
   // ------------------------------------------------------------------------------------------------- with the mutex
 
   /** From now on only matches of this view, for this goal, are used. @param view empty: none. @param goal its id. */
-  void want(const std::string& view, const std::string& goal);
+  void expectView(const std::string& view, const std::string& goal);
   /** Replaces the task, and forgets all that belongs to the old one; null: no task. */
   void setTask(std::shared_ptr<HomingTask> task);
   /** Sets whether the base may move without matches although the view's points are not tracked; setTask() sets false. */
@@ -124,7 +124,7 @@ public:
   /** The velocity along a course, by the newest odometry. Zero while stamps of images and odometry are too far apart. */
   BaseVelocity follow(const Course& course) const;
   /** The same along the course of homing. */
-  BaseVelocity wanted() const
+  BaseVelocity velocity() const
   {
     return follow(course_);
   }
