@@ -1,6 +1,7 @@
 // Copyright (c) 2026, the view_servo authors
 // SPDX-License-Identifier: BSD-3-Clause
 #include "view_servo/geometry/camera.h"
+#include "view_servo/parameters/numbers.h"
 
 #include <Eigen/Geometry>
 #include <Eigen/LU>
@@ -9,14 +10,12 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 #include <stdexcept>
 
 namespace view_servo
 {
 namespace
 {
-constexpr double NOT_A_NUMBER = std::numeric_limits<double>::quiet_NaN();
 constexpr std::size_t FISHEYE_COEFFICIENTS = 4;
 
 /** A pixel whose undistorted point comes back this far off lies where the distortion has no inverse [px]. */

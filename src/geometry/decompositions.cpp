@@ -1,11 +1,11 @@
 // Copyright (c) 2026, the view_servo authors
 // SPDX-License-Identifier: BSD-3-Clause
+#include "view_servo/parameters/numbers.h"
+
 #include "decompositions.h"
 
 #include <Eigen/Eigenvalues>
 #include <Eigen/SVD>
-
-#include <limits>
 
 namespace view_servo
 {
@@ -14,7 +14,6 @@ SymmetricEigen symmetricEigen(const Matrix9d& matrix)
   const Eigen::SelfAdjointEigenSolver<Matrix9d> solver(matrix);
   if (solver.info() != Eigen::Success)
   {
-    constexpr double NOT_A_NUMBER = std::numeric_limits<double>::quiet_NaN();
     return { Vector9d::Constant(NOT_A_NUMBER), Matrix9d::Constant(NOT_A_NUMBER) };
   }
   return { solver.eigenvalues(), solver.eigenvectors() };

@@ -4,11 +4,11 @@
 
 #include "view_servo/geometry/euclidean_homography.h"
 #include "view_servo/geometry/hand_eye.h"
+#include "view_servo/parameters/numbers.h"
 
 #include <Eigen/Core>
 #include <Eigen/Geometry>
 
-#include <cmath>
 #include <cstddef>
 #include <limits>
 #include <vector>
@@ -20,7 +20,6 @@ namespace hand_eye
 {
 constexpr double NONE = std::numeric_limits<double>::quiet_NaN();    // a number that is not known
 constexpr double ENDLESS = std::numeric_limits<double>::infinity();  // larger than all errors
-constexpr double DEGREES = 180.0 / M_PI;                             // in a radian
 constexpr int CORNERS = 4;                                           // of the view's region
 constexpr int ROWS = 2 * CORNERS;  // number of errors at a pose: u and v of each corner
 constexpr int DOF = 15;  // unknowns: camera on flange (6), view in base (6), direction (2) and distance of the plane

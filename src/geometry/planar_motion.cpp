@@ -6,20 +6,18 @@
 #include "residuals.h"
 #include "view_servo/geometry/essential.h"
 #include "view_servo/geometry/fundamental.h"
+#include "view_servo/parameters/numbers.h"
 
 #include <Eigen/Eigenvalues>
 
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <limits>
 
 namespace view_servo
 {
 namespace
 {
-constexpr double NOT_A_NUMBER = std::numeric_limits<double>::quiet_NaN();
-
 /** Derivative of levelRotation() by the yaw. */
 Eigen::Matrix3d levelRotationDerivative(double yaw)
 {

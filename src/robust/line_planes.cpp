@@ -2,6 +2,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "view_servo/robust/line_planes.h"
 
+#include "view_servo/geometry/correspondence.h"
 #include "view_servo/geometry/fundamental.h"
 #include "view_servo/geometry/homography.h"
 #include "view_servo/robust/fundamental_estimator.h"
@@ -16,8 +17,6 @@ namespace view_servo
 {
 namespace
 {
-constexpr double HUBER_WIDTH = 0.5;  // of the final fits: residuals beyond count linearly [px]
-
 }  // namespace
 
 std::vector<Parameter> parameters(LinePlaneParams& params)
@@ -94,7 +93,7 @@ std::optional<Eigen::Matrix3d> fundamentalOfPoints(const Correspondences& points
   {
     return std::nullopt;
   }
-  return polishFundamental(*found.model, select(points, found.inliers), HUBER_WIDTH);
+  return polishFundamental(*found.model, select(points, found.inliers), FIT_HUBER_WIDTH);
 }
 
 std::optional<Eigen::Matrix3d> fundamentalOfPlanes(const SegmentPairs& lines, const LinePlanes& planes)
@@ -116,7 +115,7 @@ std::optional<Eigen::Matrix3d> fundamentalOfPlanes(const SegmentPairs& lines, co
     }
   }
   const auto linear = fundamentalFromPoints(sent);
-  return linear ? std::optional<Eigen::Matrix3d>(refineFundamental(*linear, sent, HUBER_WIDTH)) : std::nullopt;
+  return linear ? std::optional<Eigen::Matrix3d>(refineFundamental(*linear, sent, FIT_HUBER_WIDTH)) : std::nullopt;
 }
 
 }  // namespace view_servo

@@ -10,6 +10,7 @@
 #include "view_servo/geometry/homography.h"
 #include "view_servo/geometry/line_homography.h"
 #include "view_servo/parameters/faults.h"
+#include "view_servo/parameters/numbers.h"
 #include "view_servo/robust/fundamental_estimator.h"
 #include "view_servo/robust/line_homography_estimator.h"
 #include "view_servo/robust/parallax.h"
@@ -31,11 +32,10 @@ namespace view_servo
 {
 namespace
 {
-constexpr double NOT_A_NUMBER = std::numeric_limits<double>::quiet_NaN();
 /** Support that the best region must have: of 128 pairs of unrelated images none had one of more than 5.6. */
 constexpr double BEYOND_CHANCE = 7.0;
 // Symmetric things in a mirrored image, as a chessboard, have matched with this significance.
-constexpr double BEYOND_MIRRORS = 120.0;
+constexpr double LINES_BEYOND_MIRRORS = 120.0;
 constexpr double DOUBTFUL = 25.0;  // a significance that calls for more care with that
 
 /** How sure a match is: the mean of what the segments share and of how alike their surroundings look. */
@@ -61,10 +61,10 @@ Correspondences positions(const std::vector<MatchedPoint>& points)
 }
 
 /** One match of two images. */
-class Attempt
+class LineAttempt
 {
 public:
-  Attempt(const LineFeatures& reference, const LineFeatures& current, const LineMatcherParams& params)
+  LineAttempt(const LineFeatures& reference, const LineFeatures& current, const LineMatcherParams& params)
     : from_(reference), to_(current), params_(params), rng_(params.seed)
   {
   }
@@ -433,8 +433,8 @@ std::optional<Eigen::Matrix3d> fundamentalOf(const Correspondences& points, cons
 }
 
 /** Adds where neighbouring lines meet, best first; true when they, or the planes, determine a fundamental matrix. */
-bool addPoints(Attempt& attempt, const SegmentPairs& lines, const LinePlanes& planes, const LineMatcherParams& params,
-               ViewMatch& result)
+bool addPoints(LineAttempt& attempt, const SegmentPairs& lines, const LinePlanes& planes,
+               const LineMatcherParams& params, ViewMatch& result)
 {
   result.matches = attempt.junctions();
   std::stable_sort(result.matches.begin(), result.matches.end(),
@@ -588,7 +588,8 @@ ViewMatch LineViewMatcher::match(const PreparedImage& reference, const PreparedI
   current.lines();
   clock.finish("current");
   ViewMatch result = match(reference.lines(), current.lines(), model, groups);
-  if (result.outcome == MatchOutcome::MATCHED && params_.refuse_mirrored && result.log_significance < BEYOND_MIRRORS)
+  if (result.outcome == MatchOutcome::MATCHED && params_.refuse_mirrored &&
+      result.log_significance < LINES_BEYOND_MIRRORS)
   {
     StageClock mirror_clock(result.stages);
     Rng rng(params_.seed);
@@ -618,7 +619,7 @@ ViewMatch LineViewMatcher::match(const LineFeatures& reference, const LineFeatur
   result.model = model;
   StageClock clock(result.stages);
 
-  Attempt attempt(reference, current, params_);
+  LineAttempt attempt(reference, current, params_);
   // Side by side; that of a stored reference is there already.
   cv::parallel_for_(cv::Range(0, 2), [&](const cv::Range& range) {
     for (int i = range.start; i < range.end; ++i)

@@ -3,6 +3,7 @@
 #include "mirror.h"
 
 #include "pair_geometry.h"
+#include "view_servo/geometry/correspondence.h"
 #include "view_servo/geometry/homography.h"
 #include "view_servo/matching/guided_matching.h"
 #include "view_servo/matching/point_matcher.h"
@@ -85,7 +86,6 @@ std::size_t mostFound(const cv::Mat& reference, const std::vector<Corner>& corne
   constexpr int ROUNDS = 3;
   constexpr double RADIUS = 4.0;  // [px]
   constexpr std::size_t FEWEST = 8;
-  constexpr double HUBER_WIDTH = 0.5;  // [px]
   GuidedParams guidance;
   guidance.min_correlation = 0.75;
   std::size_t most = 0;
@@ -103,7 +103,7 @@ std::size_t mostFound(const cv::Mat& reference, const std::vector<Corner>& corne
       {
         break;
       }
-      plane = refineHomography(plane, found, HUBER_WIDTH);
+      plane = refineHomography(plane, found, FIT_HUBER_WIDTH);
     }
   }
   return most;

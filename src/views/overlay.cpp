@@ -19,7 +19,7 @@ namespace view_servo
 namespace
 {
 /** The images are scaled so that their widths add up to something between these [px]. */
-constexpr double MIN_WIDTH = 800.0;
+constexpr double MIN_OVERLAY_WIDTH = 800.0;
 constexpr double MAX_WIDTH = 1600.0;
 constexpr double MIN_FOLLOWED_WIDTH = 400.0;  // of a single one [px]
 
@@ -292,7 +292,7 @@ cv::Mat drawOverlay(const PreparedImage& reference, const PreparedImage& current
   const cv::Size reference_size = reference.grey().size();
   const cv::Size current_size = current.grey().size();
   const double width = reference_size.width + current_size.width;
-  const double scale = std::clamp(width, MIN_WIDTH, MAX_WIDTH) / width;
+  const double scale = std::clamp(width, MIN_OVERLAY_WIDTH, MAX_WIDTH) / width;
   const auto scaled = [&](const cv::Size& size) {
     return cv::Size(std::max(cvRound(size.width * scale), 1), std::max(cvRound(size.height * scale), 1));
   };

@@ -2,6 +2,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "pair_geometry.h"
 
+#include "view_servo/geometry/correspondence.h"
 #include "view_servo/geometry/fundamental.h"
 #include "view_servo/geometry/homography.h"
 #include "view_servo/matching/assignment.h"
@@ -23,8 +24,6 @@ namespace view_servo
 {
 namespace
 {
-constexpr double HUBER_WIDTH = 0.5;  // of the final fits: residuals beyond count linearly [px]
-
 const Eigen::Matrix3d& matrixOf(const HomographyEstimator::Model& model)
 {
   return model.h;
@@ -111,7 +110,7 @@ public:
 
   Eigen::Matrix3d refine(const Eigen::Matrix3d& matrix, const Correspondences& pairs) const override
   {
-    return refineHomography(matrix, pairs, HUBER_WIDTH);
+    return refineHomography(matrix, pairs, FIT_HUBER_WIDTH);
   }
 
   std::optional<Eigen::Matrix3d> settle(const Eigen::Matrix3d& matrix, const Correspondences& /*candidates*/,
@@ -208,7 +207,7 @@ public:
 
   Eigen::Matrix3d refine(const Eigen::Matrix3d& matrix, const Correspondences& pairs) const override
   {
-    return polishFundamental(matrix, pairs, HUBER_WIDTH);
+    return polishFundamental(matrix, pairs, FIT_HUBER_WIDTH);
   }
 
   /** It has to stand without the plane on which most of those lie that agree with it. */

@@ -64,7 +64,7 @@ constexpr double BEYOND_DOUBT = 10.0;  // times the significance asked for
 
 // A symmetric thing that matches in a mirrored image does so with less than this significance or, where it is large, with
 // much around it that does not match.
-constexpr double BEYOND_MIRRORS = 60.0;
+constexpr double POINTS_BEYOND_MIRRORS = 60.0;
 constexpr double MOST_CANDIDATES = 0.5;
 
 /**
@@ -210,11 +210,11 @@ std::vector<T> chosen(const std::vector<T>& values, const std::vector<int>& indi
 }
 
 /** One comparison of two levels: candidates and, if they support one, the geometry. */
-class Attempt
+class PointAttempt
 {
 public:
-  Attempt(const PreparedImage& reference, const PreparedImage& current, const LevelTrial& trial,
-          const PairGeometry& geometry, const PointViewMatcherParams& params)
+  PointAttempt(const PreparedImage& reference, const PreparedImage& current, const LevelTrial& trial,
+               const PairGeometry& geometry, const PointViewMatcherParams& params)
     : reference_(reference),
       current_(current),
       levels_(trial.levels),
@@ -259,7 +259,7 @@ public:
       refusal_ = plane && isRepeated(*plane) ? Refusal::REPEATED : Refusal::NONE;
       clock.finish("unique");
     }
-    const bool maybe_mirrored = result.log_significance < BEYOND_MIRRORS || agreeingPart() < MOST_CANDIDATES;
+    const bool maybe_mirrored = result.log_significance < POINTS_BEYOND_MIRRORS || agreeingPart() < MOST_CANDIDATES;
     if (refusal_ == Refusal::NONE && params_.refuse_mirrored && maybe_mirrored)
     {
       std::vector<Eigen::Matrix3d> planes;
@@ -655,7 +655,7 @@ ViewMatch PointViewMatcher::match(const PreparedImage& reference, const Prepared
     clock.finish("reference");
     current.points(trial->levels.current);
     clock.finish("current");
-    Attempt attempt(reference, current, *trial, *geometry, params_);
+    PointAttempt attempt(reference, current, *trial, *geometry, params_);
     if (!attempt.hasFeatures())
     {
       continue;

@@ -16,8 +16,8 @@ namespace view_servo
 {
 namespace
 {
-constexpr int MIN_SIDE = 64;   // of a reduced image [px]
-constexpr int MIN_WIDTH = 32;  // of an image from the side, which is compressed in one direction only [px]
+constexpr int MIN_SIDE = 64;        // of a reduced image [px]
+constexpr int MIN_SIDE_WIDTH = 32;  // of an image from the side, which is compressed in one direction only [px]
 }  // namespace
 
 PreparedImage::PreparedImage(cv::Mat grey, const cv::Rect& region, const FeatureParams& params)
@@ -103,7 +103,7 @@ void PreparedImage::lookFromSide(Level& wanted, int side) const
   const cv::Size turned_size(static_cast<int>(std::ceil(high.x() - low.x())) + 1,
                              static_cast<int>(std::ceil(high.y() - low.y())) + 1);
   const cv::Size size(static_cast<int>(std::lround(turned_size.width / TILT)), turned_size.height);
-  if (size.width < MIN_WIDTH)
+  if (size.width < MIN_SIDE_WIDTH)
   {
     return;
   }

@@ -2,6 +2,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "repetition.h"
 
+#include "view_servo/geometry/correspondence.h"
 #include "view_servo/geometry/homography.h"
 #include "view_servo/matching/guided_matching.h"
 
@@ -18,7 +19,6 @@ namespace view_servo
 {
 namespace
 {
-constexpr double HUBER_WIDTH = 0.5;      // residuals beyond count linearly [px]
 constexpr double RADIUS = 4.0;           // around where a homography sends a corner [px]
 constexpr double MIN_CORRELATION = 0.7;  // of a corner's patch that is found
 constexpr double NEARLY = 0.85;          // of the part of the matches that is found where it should be
@@ -204,7 +204,7 @@ private:
     constexpr std::size_t ENOUGH = 16;
     if (found.size() >= ENOUGH)
     {
-      return refineHomography(h, found, HUBER_WIDTH);
+      return refineHomography(h, found, FIT_HUBER_WIDTH);
     }
     Eigen::Vector2d off = Eigen::Vector2d::Zero();
     for (const Correspondence& pair : found)

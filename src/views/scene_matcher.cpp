@@ -5,6 +5,7 @@
 #include "mirror.h"
 #include "repetition.h"
 #include "stage_clock.h"
+#include "view_servo/geometry/correspondence.h"
 #include "view_servo/geometry/fundamental.h"
 #include "view_servo/geometry/homography.h"
 #include "view_servo/matching/guided_matching.h"
@@ -29,7 +30,6 @@ namespace view_servo
 {
 namespace
 {
-constexpr double HUBER_WIDTH = 0.5;  // of the last fit: residuals beyond count linearly [px]
 constexpr std::size_t MIN_MATCHES = 15;
 // Significance of a plane: wrong ones of pairs that show nothing in common had 6.7 at most.
 constexpr double BEYOND_DOUBT = 15.0;
@@ -91,10 +91,10 @@ std::vector<Eigen::Matrix3d> planesOf(Correspondences pairs, double threshold, R
 }
 
 /** One match of two images. */
-class Attempt
+class SceneAttempt
 {
 public:
-  Attempt(const PreparedImage& reference, const PreparedImage& current, const SceneMatcherParams& params)
+  SceneAttempt(const PreparedImage& reference, const PreparedImage& current, const SceneMatcherParams& params)
     : reference_(reference),
       current_(current),
       params_(params),
@@ -234,7 +234,7 @@ public:
     {
       return std::nullopt;
     }
-    return refineHomography(best->h, on_plane, HUBER_WIDTH);
+    return refineHomography(best->h, on_plane, FIT_HUBER_WIDTH);
   }
 
   /** @param lines those that the line matcher has found. */
@@ -293,8 +293,8 @@ private:
    */
   void addMatchesNear(const Eigen::Matrix3d& h)
   {
-    constexpr double RADIUS = 24.0;  // [px]
-    constexpr double SAME = 1.5;     // place [px]
+    constexpr double NEAR_RADIUS = 24.0;  // [px]
+    constexpr double SAME = 1.5;          // place [px]
     std::vector<Corner> others;
     for (std::size_t i = 0; i < corners_.size(); ++i)
     {
@@ -304,7 +304,7 @@ private:
       }
     }
     const std::vector<GuidedMatch> there =
-        searchAlongHomography(reference_.grey(), others, current_.grey(), h, RADIUS, guidance_);
+        searchAlongHomography(reference_.grey(), others, current_.grey(), h, NEAR_RADIUS, guidance_);
     std::vector<Corner> seen;
     seen.reserve(there.size());
     for (const GuidedMatch& match : there)
@@ -313,7 +313,7 @@ private:
     }
     std::vector<MatchedPoint> near;
     for (const GuidedMatch& match :
-         searchAlongHomography(current_.grey(), seen, reference_.grey(), h.inverse(), RADIUS, guidance_))
+         searchAlongHomography(current_.grey(), seen, reference_.grey(), h.inverse(), NEAR_RADIUS, guidance_))
     {
       const GuidedMatch& forth = there[static_cast<std::size_t>(match.reference)];
       const Eigen::Vector2d& at = others[static_cast<std::size_t>(forth.reference)].position;
@@ -460,10 +460,10 @@ private:
     constexpr int SAMPLES = 1500;
     const double tests = std::log10(2.0);  // tolerances that may be tried
     const Parallax parallax(plane.h, pairs_, tolerance);
-    std::vector<Eigen::Matrix3d> choices{ polishFundamental(hypothesis, agreeing(hypothesis), HUBER_WIDTH) };
+    std::vector<Eigen::Matrix3d> choices{ polishFundamental(hypothesis, agreeing(hypothesis), FIT_HUBER_WIDTH) };
     if (const auto of_plane = parallax.findFundamental(SAMPLES, rng_))
     {
-      choices.push_back(polishFundamental(*of_plane, agreeing(*of_plane), HUBER_WIDTH));
+      choices.push_back(polishFundamental(*of_plane, agreeing(*of_plane), FIT_HUBER_WIDTH));
     }
     for (const Eigen::Matrix3d& choice : choices)
     {
@@ -574,7 +574,7 @@ ViewMatch matchPoints(const PreparedImage& reference, const PreparedImage& curre
 }
 
 /** Tries the planes that the line matcher has found, and those on which matches of corners agree. */
-void addPlanes(const ViewMatch& lines, const ViewMatch& points, double threshold, Rng& rng, Attempt& attempt)
+void addPlanes(const ViewMatch& lines, const ViewMatch& points, double threshold, Rng& rng, SceneAttempt& attempt)
 {
   for (std::size_t i = 0; i < lines.planes.size(); ++i)
   {
@@ -670,7 +670,7 @@ ViewMatch SceneMatcher::match(const PreparedImage& reference, const PreparedImag
     return result;
   }
 
-  Attempt attempt(reference, current, params_);
+  SceneAttempt attempt(reference, current, params_);
   Rng rng(params_.seed);
   addPlanes(lines, points, params_.points.ransac.inlier_threshold, rng, attempt);
   clock.finish("planes");

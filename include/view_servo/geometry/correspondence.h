@@ -27,6 +27,9 @@ struct Correspondence
 
 using Correspondences = std::vector<Correspondence>;
 
+/** Of the last fit to matched points: residuals beyond it count linearly instead of squared [px]. */
+inline constexpr double FIT_HUBER_WIDTH = 0.5;
+
 /** The pairs with the given indices, in that order. */
 inline Correspondences select(const Correspondences& pairs, const std::vector<int>& indices)
 {

@@ -63,7 +63,7 @@ struct HandEyeResidual
   bool used = false;         ///< false: the pose disagrees with the others, and was left out
   double pixels = 0.0;       ///< root mean square distance of the view's corners from where they should be [px]
   double translation = 0.0;  ///< distance between the camera by the arm and by the image [m]
-  double rotation = 0.0;     ///< angle between the two [rad]
+  double rotation = 0.0;     ///< angle between the camera's orientation by the arm and by the image [rad]
 };
 
 /** What calibrateHandEye() finds. All but `residuals` and `motion` is without meaning unless `found`. */
