@@ -1,5 +1,7 @@
 // Copyright (c) 2026, the view_servo authors
 // SPDX-License-Identifier: BSD-3-Clause
+#include "view_servo/parameters/numbers.h"
+
 #include "check/motion.h"
 
 #include <algorithm>
@@ -9,7 +11,6 @@ namespace view_servo::check
 {
 namespace
 {
-constexpr double DEGREE = M_PI / 180.0;
 constexpr double MOVED_AT_ALL = 0.25;          // part of what was asked
 constexpr double SCALE_BY_COMMAND = 0.25;      // part by which a robot may do more or less than it is told
 constexpr double SCALE_BY_IMAGES = 0.10;       // part by which odometry's angle may differ from that of the images

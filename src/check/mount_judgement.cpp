@@ -1,5 +1,7 @@
 // Copyright (c) 2026, the view_servo authors
 // SPDX-License-Identifier: BSD-3-Clause
+#include "view_servo/parameters/numbers.h"
+
 #include "check/judgements.h"
 
 #include <algorithm>
@@ -9,8 +11,6 @@ namespace view_servo::check
 {
 namespace
 {
-constexpr double DEGREE = M_PI / 180.0;
-
 std::string degrees(double angle)
 {
   return number(angle / DEGREE, 0) + " degrees";

@@ -1,5 +1,7 @@
 // Copyright (c) 2026, the view_servo authors
 // SPDX-License-Identifier: BSD-3-Clause
+#include "view_servo/parameters/numbers.h"
+
 #include "check/judgements.h"
 
 #include <cmath>
@@ -8,8 +10,6 @@ namespace view_servo::check
 {
 namespace
 {
-constexpr double DEGREE = M_PI / 180.0;
-
 std::string join(const std::vector<std::string>& names)
 {
   constexpr std::size_t MOST = 4;

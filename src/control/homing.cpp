@@ -5,6 +5,7 @@
 #include "view_servo/geometry/camera_warp.h"
 #include "view_servo/geometry/fundamental.h"
 #include "view_servo/parameters/faults.h"
+#include "view_servo/parameters/numbers.h"
 
 #include <Eigen/Geometry>
 
@@ -20,7 +21,6 @@ namespace view_servo
 namespace
 {
 constexpr double ODOMETRY_KEPT = 10.0;  // [s]
-constexpr double NOT_A_NUMBER = std::numeric_limits<double>::quiet_NaN();
 
 /** Chapter 5 as printed. */
 class ThesisHoming : public Homing

@@ -4,6 +4,7 @@
 
 #include "view_servo/geometry/rotation_vector.h"
 #include "view_servo/parameters/faults.h"
+#include "view_servo/parameters/numbers.h"
 
 #include <visp3/core/vpColVector.h>
 #include <visp3/core/vpThetaUVector.h>
@@ -25,8 +26,6 @@ namespace view_servo
 {
 namespace
 {
-constexpr double DEGREES = 180.0 / M_PI;
-
 /** The displacement of a body that moves by a twist of its own for a time: where its frame is in the former one. */
 Eigen::Isometry3d displacement(const Twist& twist, double duration)
 {

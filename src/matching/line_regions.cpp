@@ -352,7 +352,7 @@ private:
       hypotheses.resize(static_cast<std::size_t>(params_.max_hypotheses));
     }
     constexpr double WORTH_REFINING = 0.6;  // of the support asked for
-    std::vector<int> near = from_.near(candidate.row);
+    std::vector<int> near = from_.neighboursOf(candidate.row);
     near.push_back(candidate.row);
     LineRegion region{ {}, {}, WORTH_REFINING * params_.min_support };
     for (const Hypothesis& tried : hypotheses)

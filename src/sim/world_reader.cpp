@@ -5,6 +5,7 @@
 #include "sim/textures.h"
 #include "view_servo/images/image_io.h"
 #include "view_servo/parameters/error_text.h"
+#include "view_servo/parameters/numbers.h"
 #include "view_servo/parameters/yaml_text.h"
 
 #include <yaml-cpp/yaml.h>
@@ -26,7 +27,6 @@ namespace view_servo::sim
 {
 namespace
 {
-constexpr double DEGREE = M_PI / 180.0;
 /** Things whose lowest point is above this are no obstacle for the base [m]. */
 constexpr double ROBOT_HEIGHT = 1.3;
 

@@ -5,6 +5,7 @@
 #include "tools/hand_eye_session.h"
 #include "view_servo/geometry/hand_eye.h"
 #include "view_servo/parameters/error_text.h"
+#include "view_servo/parameters/numbers.h"
 #include "view_servo/ros/control_node.h"
 #include "view_servo/views/hand_eye_file.h"
 
@@ -14,7 +15,6 @@
 #include <ros/spinner.h>
 
 #include <chrono>
-#include <cmath>
 #include <cstdint>
 #include <cstdio>
 #include <ctime>
@@ -37,7 +37,6 @@ using Clock = std::chrono::steady_clock;
 constexpr int DONE = 0;
 constexpr int NOT_DONE = 1;
 constexpr int CANNOT = 2;
-constexpr double DEGREES = 180.0 / M_PI;
 
 struct Options
 {

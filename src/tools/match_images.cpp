@@ -10,6 +10,7 @@
 #include "view_servo/geometry/fundamental.h"
 #include "view_servo/matching/line_features.h"
 #include "view_servo/parameters/error_text.h"
+#include "view_servo/parameters/numbers.h"
 #include "view_servo/views/camera_file.h"
 #include "view_servo/views/line_view_matcher.h"
 #include "view_servo/views/point_view_matcher.h"
@@ -141,7 +142,6 @@ nlohmann::json resultOf(const SceneMotion& motion)
 
 void printMotion(const SceneMotion& motion)
 {
-  constexpr double DEGREES = 180.0 / M_PI;
   const Eigen::AngleAxisd turn(motion.pose.rotation);
   std::cout << "motion, X_cur = R X_ref + t: a turn of " << turn.angle() * DEGREES << " degrees about "
             << turn.axis().transpose() << ", t along " << motion.pose.translation.transpose()

@@ -1,6 +1,8 @@
 // Copyright (c) 2026, the view_servo authors
 // SPDX-License-Identifier: BSD-3-Clause
 // Who of command, odometry and images is wrong; and what images of a simulated room and plane say of a motion.
+#include "view_servo/parameters/numbers.h"
+
 #include "check/motion.h"
 
 #include "sim/renderer.h"
@@ -17,7 +19,6 @@ namespace view_servo::check
 {
 namespace
 {
-constexpr double DEGREE = M_PI / 180.0;
 const Eigen::Vector3d ZERO = Eigen::Vector3d::Zero();
 
 Leg slide(const Eigen::Vector3d& asked, const Eigen::Vector3d& measured, const Eigen::Vector3d& seen)

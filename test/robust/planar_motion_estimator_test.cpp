@@ -4,6 +4,7 @@
 
 #include "support/level_matches.h"
 #include "view_servo/geometry/fundamental.h"
+#include "view_servo/parameters/numbers.h"
 #include "view_servo/robust/ransac.h"
 #include "view_servo/robust/significance.h"
 
@@ -25,11 +26,9 @@ using test::inImage;
 using test::noisy;
 using test::randomPosition;
 
-constexpr double NOT_A_NUMBER = std::numeric_limits<double>::quiet_NaN();
 constexpr double THRESHOLD = 2.0 / FOCAL_LENGTH;  // of inliers
 constexpr double MAX_YAW = 0.6;                   // [rad]
 constexpr double BY_CHANCE = 2.2 * THRESHOLD;     // about the part of an image within THRESHOLD of a line through it
-constexpr double DEGREE = M_PI / 180.0;
 constexpr int SAMPLE_SIZE = PlanarMotionEstimator::SAMPLE_SIZE;
 
 /** The current point of a reference point at a depth, exact; NaN when it is not in the image. */

@@ -3,6 +3,7 @@
 #pragma once
 
 #include "support/synthetic_scene.h"
+#include "view_servo/parameters/numbers.h"
 #include "view_servo/robust/ransac.h"
 
 #include <Eigen/Core>
@@ -19,7 +20,6 @@ namespace view_servo
 {
 /** @file Problems for the RANSAC loop: lines in a plane, and scenes that two cameras see. */
 
-constexpr double NOT_A_NUMBER = std::numeric_limits<double>::quiet_NaN();
 constexpr double INFINITE = std::numeric_limits<double>::infinity();
 
 /** A line through two points, n^T x = c with unit n; counts what it is asked. */

@@ -12,6 +12,7 @@
 #include "view_servo/StartRoute.h"
 #include "view_servo/WantedView.h"
 #include "view_servo/geometry/planar_pose.h"
+#include "view_servo/parameters/numbers.h"
 #include "view_servo/ros/call_service.h"
 #include "view_servo/views/route_store.h"
 
@@ -40,7 +41,6 @@ namespace
 using GoalState = actionlib::SimpleClientGoalState;
 using Clock = std::chrono::steady_clock;
 
-constexpr double DEGREE = M_PI / 180.0;
 constexpr double STOPS_WITHIN = 0.3 * SLOWDOWN;  // [s]
 const PlanarPose BEGIN{ -2.0, 0.15, 0.0 };       // of the base in the world
 const PlanarPose END{ 0.1, -0.1, 0.0 };

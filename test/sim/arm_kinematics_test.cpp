@@ -4,6 +4,7 @@
 
 #include "support/shipped_files.h"
 #include "support/text_file.h"
+#include "view_servo/parameters/numbers.h"
 #include "view_servo/robust/random.h"
 
 #include <gtest/gtest.h>
@@ -23,7 +24,6 @@ using Twist = ArmKinematics::Twist;
 using test::pumaUrdf;
 
 constexpr double ACCURACY = 1e-6;  // [m, rad]
-constexpr double DEGREE = M_PI / 180.0;
 
 /** Well within all limits and away from singularities. */
 const Joints FORWARD = (Joints() << 0.0, 0.9, -3.05, 0.0, 0.579204, 0.0).finished();

@@ -2,6 +2,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include "view_servo/parameters/numbers.h"
+
 #include "sim/puma.h"
 #include "support/shipped_files.h"
 #include "support/thrown_message.h"
@@ -22,7 +24,6 @@ using Joints = Puma::Joints;
 using State = Puma::State;
 using Twist = Puma::Twist;
 
-constexpr double DEGREE = M_PI / 180.0;
 constexpr double DT = 0.001;  // [s]
 
 /** Of the URDF, written down again. */

@@ -5,6 +5,7 @@
 #include "support/cameras.h"
 #include "support/synthetic_scene.h"
 #include "view_servo/geometry/homography.h"
+#include "view_servo/parameters/numbers.h"
 
 #include <gtest/gtest.h>
 #include <Eigen/Geometry>
@@ -20,8 +21,6 @@ namespace view_servo
 {
 namespace
 {
-constexpr double DEGREE = M_PI / 180.0;
-
 const Eigen::Matrix3d K = test::cameraMatrix(600.0, 600.0, 320.0, 240.0);
 
 /** A camera that moves before a plane, with the homographies that noisy points give. */

@@ -7,6 +7,7 @@
 
 #include "sim/textures.h"
 #include "view_servo/geometry/homography.h"
+#include "view_servo/parameters/numbers.h"
 #include "view_servo/robust/random.h"
 
 #include <gtest/gtest.h>
@@ -28,7 +29,6 @@ namespace view_servo
 {
 namespace
 {
-constexpr double DEGREE = M_PI / 180.0;
 constexpr int WIDTH = 640;
 constexpr int HEIGHT = 480;
 constexpr double DISTANCE = 0.6;  // [m]

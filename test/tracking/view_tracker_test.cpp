@@ -7,6 +7,7 @@
 #include "sim/world_reader.h"
 #include "support/shipped_files.h"
 #include "support/textured_plane.h"
+#include "view_servo/parameters/numbers.h"
 #include "view_servo/robust/random.h"
 
 #include <gtest/gtest.h>
@@ -28,8 +29,6 @@ namespace view_servo
 {
 namespace
 {
-constexpr double DEGREE = M_PI / 180.0;
-
 /** What a wrong prediction is off by. */
 const PlanarPose ODOMETRY_ERROR{ 0.02, -0.015, 0.01 };
 

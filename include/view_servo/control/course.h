@@ -28,12 +28,12 @@ struct Course
   // TO_VIEW.
   PlanarPose view;  ///< base pose at the view, in odometry's frame
 
-  // TO_VIEW, TURN and LINE.
-  double gain = 1.0;           ///< the base's speed divided by its distance from the course's end [1/s]
-  double turn_gain = 1.0;      ///< the base's turn rate divided by its yaw error [1/s]
-  double min_speed = 0.0;      ///< the base is no slower, however near the end is [m/s]
+  // How fast; each names the kinds that use it.
+  double gain = 1.0;           ///< TO_VIEW, LINE: speed over the distance that is left, for LINE along the line [1/s]
+  double turn_gain = 1.0;      ///< TO_VIEW, TURN: turn rate over the yaw error [1/s]
+  double min_speed = 0.0;      ///< TO_VIEW, LINE: least speed, but a LINE stands within its tolerance [m/s]
   double min_turn_rate = 0.0;  ///< TURN: the base turns no slower, however little is left [rad/s]
-  double max_speed = std::numeric_limits<double>::infinity();  ///< the base is no faster, however far the end is [m/s]
+  double max_speed = std::numeric_limits<double>::infinity();  ///< TO_VIEW, LINE: largest speed [m/s]
 
   // TURN and LINE.
   PlanarPose end;                   ///< in odometry's frame; a TURN uses only its yaw; the line of a LINE is its x axis

@@ -38,7 +38,7 @@ struct Circumstances
   double timeout = 0.0;        ///< time limit of the goal [s]
   std::string fault;  ///< why the driver's state cannot be trusted any more: time went back, an exception; empty: none
   std::string missing_input;  ///< which input does not come, and since when; empty: all come
-  double missing_for = 0.0;   ///< time since the missing input last came [s]; meaningless while all come
+  double missing_for = 0.0;   ///< since a cycle first found an input missing [s]; 0 while all come
   std::string held;           ///< why the robot has to stand although all inputs come; empty: it need not
   double patience = 0.0;      ///< a goal ends when an input is missing for longer than this [s]
 };
@@ -51,7 +51,7 @@ struct Verdict
     DRIVE,    ///< send the velocity that is wanted
     STAND,    ///< send zero, the goal goes on
     SUCCEED,  ///< stop, and end the goal with success
-    ABORT     ///< stop, and end the goal without
+    ABORT     ///< stop, and end the goal without success
   };
   What what;
   std::string reason;  ///< one line, never empty
@@ -60,8 +60,9 @@ struct Verdict
 /**
  * Judges a goal. The first of these conditions that holds decides: the node ends, another goal has come, the driver's
  * state cannot be trusted, it is disabled, the goal is cancelled, the robot has arrived, the driver has given up, the
- * time is over, nobody listens, an input is missing, the robot is held. The last three do not matter while the goal is
- * prepared. A driver that gives up may do so for want of an input: the reason says both then.
+ * time is over, nobody listens, an input is missing, the robot is held. The last three count only
+ * once the goal has begun, not while it is prepared. A missing input makes the robot stand, and ends the goal after
+ * `patience`. Where none of them holds, it drives if the driver is in state DRIVING, and else stands. A driver that gives up may do so for want of an input: the reason says both then.
  */
 Verdict judge(const Circumstances& circumstances, const Progress& progress);
 

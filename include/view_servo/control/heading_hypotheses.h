@@ -31,8 +31,8 @@ struct HeadingHypothesesParams
   /** Least -log10 of the expected number of false alarms, for a motion to become a hypothesis. */
   double min_significance = 6.0;
   double memory = 0.7;            ///< part of its weight that a hypothesis keeps from one set of matches to the next
-  int max_hypotheses = 5;         ///< hypotheses kept at most, those of most weight
-  double assumed_distance = 1.0;  ///< distance of the view that is assumed when it is found first [m]
+  int max_hypotheses = 5;         ///< at most this many hypotheses are kept, those with the largest weights
+  double assumed_distance = 1.0;  ///< distance from the camera at which a new hypothesis puts the view [m]
   std::uint64_t seed = 1;         ///< fixes all random draws
 
   /** Each fault in one line, those of nested parameters included; empty when the parameters are usable. */

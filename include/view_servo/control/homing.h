@@ -86,7 +86,7 @@ struct HomingReport
   bool at_view = false;   ///< the base is within arrival_distance and arrival_yaw, and the image looks like the view
   /** Direction to the view's base pose in base_link, positive to the left [rad]. */
   double heading = std::numeric_limits<double>::quiet_NaN();
-  double yaw_error = std::numeric_limits<double>::quiet_NaN();  ///< angle left to turn, positive to the left [rad]
+  double yaw_error = std::numeric_limits<double>::quiet_NaN();  ///< angle still to be turned, counter-clockwise [rad]
   double distance = std::numeric_limits<double>::quiet_NaN();   ///< distance left to drive [m]
   /**
    * Share of the matches (mode SERVO: or tracked points) that agree, [0, 1]; mode THESIS: of the votes in the chosen
@@ -108,7 +108,8 @@ struct HomingReport
   int inliers = 0;       ///< number of matches or tracked points that agree; mode THESIS: number of all matches
   /** The base's pose at the view, in odometry's frame; empty until its distance is known in metres, and when it is lost. */
   std::optional<PlanarPose> goal_in_odom;
-  Eigen::Matrix3d goal_covariance = Eigen::Matrix3d::Zero();  ///< covariance of (x, y, yaw) of goal_in_odom [m, rad]
+  /** Covariance of (x, y, yaw) of goal_in_odom [m, rad]; zero, and without meaning, while that is empty. */
+  Eigen::Matrix3d goal_covariance = Eigen::Matrix3d::Zero();
   /** How much later than images odometry is stamped; see ClockOffset [s]. */
   double odometry_delay = std::numeric_limits<double>::quiet_NaN();
 };

@@ -131,8 +131,8 @@ public:
   ~Servo25d();
 
   /**
-   * An image in which the plane was found. One with numbers that are not finite is a loss; one older than the last is
-   * ignored.
+   * An image in which the plane was found. One with numbers that are not finite, or with a distance that is not above
+   * 0, is a loss. One that is older than the last is ignored, and so is everything after FAILED.
    */
   void add(const PlaneView& view);
 

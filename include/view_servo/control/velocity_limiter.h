@@ -23,8 +23,8 @@ struct VelocityLimits
 {
   double max_speed = 0.25;             ///< largest norm of the linear velocity [m/s]
   double max_turn_rate = 0.4;          ///< largest norm of the angular velocity [rad/s]
-  double max_acceleration = 0.5;       ///< largest change of the linear velocity [m/s²]
-  double max_turn_acceleration = 1.0;  ///< largest change of the angular velocity [rad/s²]
+  double max_acceleration = 0.5;       ///< largest rate at which the linear velocity changes, but for a stop [m/s²]
+  double max_turn_acceleration = 1.0;  ///< largest rate at which the angular velocity changes, but for a stop [rad/s²]
 
   /** Each fault in one line, those of nested parameters included; empty when the parameters are usable. */
   std::vector<std::string> validate() const;
@@ -37,8 +37,8 @@ std::vector<Parameter> parameters(VelocityLimits& params);
 inline const VelocityLimits ARM_LIMITS{ 0.15, 0.6, 0.5, 2.0 };
 
 /**
- * Keeps velocities within limits. A velocity is scaled as a whole, so that its direction stays, and changes gradually.
- * Its first LINEAR components are a linear velocity, the ANGULAR others a turn rate.
+ * Keeps velocities within limits. Linear and angular part are scaled by one factor, so that their ratio stays, and each
+ * change is limited in the same way, except that a stop is immediate. Its first LINEAR components are a linear velocity, the ANGULAR others a turn rate.
  */
 template <int LINEAR, int ANGULAR>
 class VelocityLimiter
@@ -51,7 +51,10 @@ public:
   {
   }
 
-  /** The velocity allowed `dt` [s] after the last one. A wanted velocity that is zero or not finite stops at once. */
+  /**
+   * The velocity allowed `dt` [s] after the last one. A wanted velocity that is zero or not finite stops at once. With a
+   * `dt` that is not above 0 the last velocity stays.
+   */
   Velocity next(const Velocity& wanted, double dt)
   {
     if (!wanted.allFinite() || wanted.isZero(0.0))

@@ -15,7 +15,7 @@ namespace view_servo
 /** Options of the Harris detector (thesis 2.7; eq. 2.20-2.24). */
 struct CornerParams
 {
-  int max_corners = 500;            ///< the strongest are kept
+  int max_corners = 500;            ///< at most this many corners are returned, the strongest
   double derivative_sigma = 0.7;    ///< Gaussian derivative scale [px]
   double integration_sigma = 1.4;   ///< Gaussian window of the second-moment matrix [px]
   double k = 0.04;                  ///< weight of the trace in the Harris measure R = det(M) - k tr(M)²
@@ -34,7 +34,7 @@ std::vector<Parameter> parameters(CornerParams& params);
 struct Corner
 {
   Eigen::Vector2d position;  ///< [px]
-  float response;            ///< Harris measure R of eq. 2.24 (grey levels⁴)
+  float response;            ///< Harris measure R of eq. 2.24 [(grey levels / px)⁴]
 };
 
 /**

@@ -17,7 +17,7 @@ struct EdgeParams
 {
   double sigma = 1.0;           ///< Gaussian derivative scale [px]
   double low_threshold = 2.0;   ///< least gradient of every pixel of a chain [grey levels/px]
-  double high_threshold = 4.0;  ///< least gradient of one pixel of a chain [grey levels/px]
+  double high_threshold = 4.0;  ///< at least one pixel of a chain has this gradient [grey levels/px]
   int min_points = 5;           ///< least number of pixels of a chain that is kept
 
   /** Each fault in one line, those of nested parameters included; empty when the parameters are usable. */

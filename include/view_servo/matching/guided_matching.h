@@ -39,9 +39,11 @@ struct GuidedMatch
  * Looks for every reference corner near where a homography (reference -> current) sends it: the place, to a fraction of
  * a pixel, at which the reference patch, warped by the homography's affine approximation, has its largest zero-mean
  * normalised correlation with the current image. So a corner is found again whether or not the detector found it.
- * Corners whose best place lies on the rim of the search region, or correlates too little, are left out.
+ * Left out are corners whose best place lies on the rim of the search region or correlates too little, whose reference
+ * patch is flat, or that are sent nearer to the image's border than the radius and the patch need. The others come in
+ * the order of `corners`.
  * @param reference, current 8-bit, one channel.
- * @param radius of the search region around the prediction, in each direction [px].
+ * @param radius of the search region around the prediction, in each direction, rounded up to whole pixels, at least 1 [px].
  */
 std::vector<GuidedMatch> searchAlongHomography(const cv::Mat& reference, const std::vector<Corner>& corners,
                                                const cv::Mat& current, const Eigen::Matrix3d& h, double radius,

@@ -23,7 +23,7 @@ struct LineFeatureParams
 {
   LineGroupParams groups;
   int max_grouped = 400;     ///< at most this many segments, the longest, form groups and start regions
-  int neighbours = 40;       ///< number of nearest segments that are kept for each grouped one, see near()
+  int neighbours = 40;       ///< number of nearest segments that are kept for each grouped one, see neighboursOf()
   int neighbour_pairs = 15;  ///< most segments kept for each whose lines meet its own, the nearest, see meetings()
 
   /** Each fault in one line, those of nested parameters included; empty when the parameters are usable. */
@@ -90,7 +90,7 @@ public:
     return smoothed_;
   }
   /** The neighbours of a grouped segment, nearest first. */
-  const std::vector<int>& near(int i) const
+  const std::vector<int>& neighboursOf(int i) const
   {
     return near_[static_cast<std::size_t>(i)];
   }

@@ -32,8 +32,8 @@ enum class LineGrouping
 /** How a segment's start is told from its end, and the first segment of a pair from the second. */
 enum class LineOrder
 {
-  CONTRAST,  ///< start and end as given (brighter side left); a pair in the sense of rotation: free of roll
-  UPRIGHT    ///< thesis 4.1: a vertical segment, bottom to top, and a non-vertical one, left to right: no roll
+  CONTRAST,  ///< start and end as given (brighter side left), a pair by its sense of rotation; works under any roll
+  UPRIGHT    ///< thesis 4.1: vertical ones from bottom to top, others left to right; the cameras must not roll
 };
 
 /** Options of forming groups. */

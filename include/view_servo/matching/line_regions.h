@@ -70,13 +70,13 @@ std::vector<LineRegion> findLineRegions(const LineFeatures& reference, const Lin
 
 /**
  * The region that grows from a homography and the matches, at least three, that gave it. Empty when the images beside
- * its segments do not look alike.
+ * its segments do not look alike on average, or when the matches that do look alike have less than params.min_support.
  */
 std::optional<LineRegion> growLineRegion(const LineFeatures& reference, const LineFeatures& current,
                                          const Eigen::Matrix3d& h, const std::vector<SegmentMatch>& matches,
                                          const LineRegionParams& params);
 
-/** Number of directions in the current image that evidenceOf() tells apart: 45 degrees apart, that of the rows first. */
+/** Directions in the current image that evidenceOf() tells apart: 45 degrees apart, along u first, then towards v. */
 constexpr std::size_t LINE_DIRECTIONS = 4;
 
 /** Of the segments that lie across one direction: how many are found where a homography sends them, how many beside. */
@@ -84,7 +84,7 @@ struct LineEvidence
 {
   std::size_t seen = 0;    ///< segments sent into the current image
   std::size_t found = 0;   ///< of these, those for which a segment is there that looks alike
-  std::size_t tried = 0;   ///< trials of sending a segment a little aside, several for each
+  std::size_t tried = 0;   ///< trials of sending a segment 10, 17 or 27 px aside, both ways: six for each one seen
   std::size_t beside = 0;  ///< of these, those for which a segment is there that looks alike
 
   /** Probability that a segment is found where it does not belong, as the rule of succession estimates it, (0, 1). */
@@ -96,9 +96,9 @@ struct LineEvidence
 };
 
 /**
- * What the segments between a region's matches say of its homography, for each of the directions: those segments count
- * that lie across it, as only they show a shift along it. All reference
- * segments within the box around the matches count, matched or not, but for those that `others` marks.
+ * What the reference segments in the box around a region's matches say of its homography, for each direction. For a
+ * direction only segments at 45 degrees or more to it count, as only they show a shift along it. Whether a segment is
+ * matched does not matter, but those that `others` marks are left out.
  * @param others for each reference segment, whether another region has matched it.
  */
 std::array<LineEvidence, LINE_DIRECTIONS> evidenceOf(const LineRegion& region, const LineFeatures& reference,

@@ -22,7 +22,7 @@ namespace view_servo
 /** Options of the search for planes. */
 struct LinePlaneParams
 {
-  double threshold = 2.0;  ///< largest distance of a plane's lines, across, in either image [px]
+  double threshold = 2.0;  ///< largest distance of a plane's lines, across, RMS of the two images [px]
   int min_lines = 8;       ///< least number of lines that make a plane
   int max_planes = 4;      ///< at most this many planes are looked for
 
@@ -54,8 +54,9 @@ bool liesOnPlane(const LinePlanes& planes, const Correspondence& point, double t
 
 /**
  * Fundamental matrix (x_curᵀ F x_ref = 0, pixels) by RANSAC from points, such as intersections of matched lines. Empty
- * when there are fewer than twelve and when no matrix agrees with twelve. Where nearly all lie on one plane, any F with
- * some epipole agrees: see Parallax.
+ * when there are fewer than twelve points, or when no matrix agrees with at least twelve. Samples are uniform, whatever
+ * params.sampling says. Where nearly all points lie on one plane, a matrix with any epipole agrees with them: Parallax
+ * tells that.
  */
 std::optional<Eigen::Matrix3d> fundamentalOfPoints(const Correspondences& points, const RansacParams& params, Rng& rng);
 

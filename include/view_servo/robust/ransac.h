@@ -16,7 +16,7 @@ namespace view_servo
 /** Options of the one RANSAC loop. */
 struct RansacParams
 {
-  double inlier_threshold = 3.0;   ///< largest error of an inlier [px]
+  double inlier_threshold = 3.0;   ///< largest error of an inlier, in the unit of the estimator's data, mostly [px]
   double confidence = 0.999;       ///< probability to be reached that some sample drawn is free of outliers, (0, 1)
   int min_iterations = 100;        ///< samples solved before the adaptive stop (thesis eq. 9.5) may end the search
   int max_iterations = 2000;       ///< random samples solved at most
@@ -36,8 +36,8 @@ std::vector<Parameter> parameters(RansacParams& params);
 enum class RansacStop
 {
   CONFIDENCE_REACHED,  ///< so many samples were drawn that one without outliers is likely enough
-  ITERATION_LIMIT,     ///< max_iterations
-  REJECTION_LIMIT,     ///< max_rejected
+  ITERATION_LIMIT,     ///< RansacParams::max_iterations samples were solved
+  REJECTION_LIMIT,     ///< more than RansacParams::max_rejected samples were refused
   TOO_FEW_DATA         ///< no sample can be drawn from so few
 };
 
@@ -58,7 +58,7 @@ struct RansacResult
   std::vector<int> inliers;    ///< indices of the data within the threshold, ascending
   /**
    * Cost of the model as the Consensus computes it, the smaller the better; with MSAC the sum over all data of
-   * min(error(), inlier_threshold²) [px²]. Without a model: Consensus::costOfNone().
+   * min(error(), inlier_threshold²), in that unit squared. Without a model: Consensus::costOfNone().
    */
   double cost = 0.0;
   RansacStatistics statistics;
@@ -73,7 +73,7 @@ struct RansacResult
  *  - `std::size_t size() const`: number of data,
  *  - `bool accepts(const std::vector<int>& sample) const`: cheap test before solving,
  *  - `void solve(const std::vector<int>& sample, std::vector<Model>& models) const`: appends the minimal solutions,
- *  - `double error(const Model&, std::size_t i) const`: squared error of datum i [px²], possibly infinite,
+ *  - `double error(const Model&, std::size_t i) const`: squared error of datum i, in the unit of the data squared, possibly infinite,
  *  - `std::optional<Model> refit(const Model&, const std::vector<int>& inliers) const`: fit to many.
  *
  * The same generator state and data give the same result on every machine.

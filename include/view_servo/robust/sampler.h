@@ -16,7 +16,7 @@ class Sampler
 public:
   virtual ~Sampler() = default;
 
-  /** Sets `sample` to a new one; false when none can be drawn. */
+  /** Sets `sample` to a new one. False when none can be drawn; `sample` is then without meaning. */
   virtual bool draw(Rng& rng, std::vector<int>& sample) = 0;
 
   /** Probability that a datum drawn belongs to `inliers` (ascending), for the adaptive stop (thesis eq. 9.5). */
@@ -25,7 +25,10 @@ public:
   /** Number of candidates that the improvement stage (thesis 9.4) tries at each position of the best sample. */
   virtual int replacements() const = 0;
 
-  /** Replaces the sample's entry at `position` by candidate number `trial`; false if there is none that fits there. */
+  /**
+   * Replaces the sample's entry at `position` by another datum: number `trial` of those that are tried in turn, or one
+   * that is drawn, as the sampler has it. False, and nothing changes, when none fits there.
+   */
   virtual bool replace(Rng& rng, int trial, std::size_t position, std::vector<int>& sample) const = 0;
 };
 

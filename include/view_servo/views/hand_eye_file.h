@@ -14,9 +14,9 @@ namespace view_servo
 /** A hand-eye calibration with the names of its frames, as a file holds it. */
 struct HandEyeFile
 {
-  std::string base_frame;                                              ///< of the arm
-  std::string flange_frame;                                            ///< that the camera is mounted on
-  std::string camera_frame;                                            ///< the camera's optical frame
+  std::string base_frame;    ///< tf frame of the arm's base
+  std::string flange_frame;  ///< tf frame of the flange that carries the camera
+  std::string camera_frame;  ///< the camera's optical frame
   Eigen::Isometry3d camera_in_flange = Eigen::Isometry3d::Identity();  ///< [m]
   std::vector<double> covariance;  ///< row-major 6x6, as HandEyeResult has it [m, rad]; may be empty
   std::string comment;             ///< one line; is written, not read
@@ -35,10 +35,10 @@ void writeHandEyeFile(const HandEyeFile& hand_eye, const std::string& path);
 /** What a calibration is computed from, as a file holds it. */
 struct HandEyePosesFile
 {
-  std::string base_frame;    ///< of the arm
-  std::string flange_frame;  ///< that the camera is mounted on
+  std::string base_frame;    ///< tf frame of the arm's base
+  std::string flange_frame;  ///< tf frame of the flange that carries the camera
   std::string camera_frame;  ///< the camera's optical frame
-  std::string view_name;     ///< of the stored view
+  std::string view_name;     ///< name of the stored view
   HandEyeView view;
   std::vector<HandEyePose> poses;
   std::string comment;  ///< one line; is written, not read

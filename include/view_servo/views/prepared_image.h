@@ -32,9 +32,9 @@ struct FeatureParams
   {
   }
 
-  PointMatcherParams points;   ///< of corners and profiles
-  LineSegmentParams segments;  ///< of line segments
-  LineFeatureParams lines;     ///< of what matching of line segments needs
+  PointMatcherParams points;   ///< options of corners, profiles and their matching
+  LineSegmentParams segments;  ///< options of the detection of line segments
+  LineFeatureParams lines;     ///< options of the groups of line segments
 };
 
 /**
@@ -51,7 +51,7 @@ public:
   static constexpr int SCALES = 5;               ///< number of levels that are the image reduced
   static constexpr int SIDES = 8;                ///< number of levels that are the image from the sides
   static constexpr int LEVELS = SCALES + SIDES;  ///< number of all levels
-  static constexpr double TILT = 5.5;            ///< factor by which these are compressed
+  static constexpr double TILT = 5.5;            ///< factor by which an image from the side is compressed
 
   /**
    * @param grey 8-bit, one channel; the data is shared and must not be changed afterwards.
