@@ -15,7 +15,7 @@ namespace view_servo
 {
 namespace
 {
-constexpr double THRESHOLD = 2.0;  // [px]
+constexpr double PARALLAX_THRESHOLD = 2.0;  // [px]
 
 /** Pairs on the plane of a scene, pairs off it, and wrong ones. */
 struct PlaneScene
@@ -60,7 +60,7 @@ TEST(Parallax, FindsTheEpipoleThatAPlaneLeavesOpen)
   for (std::uint64_t seed = 1; seed <= 10; ++seed)
   {
     const PlaneScene plane(25, 50, seed);
-    const Parallax parallax(plane.scene.homography, plane.pairs, THRESHOLD);
+    const Parallax parallax(plane.scene.homography, plane.pairs, PARALLAX_THRESHOLD);
     Rng rng(seed);
     const auto f = parallax.findFundamental(1500, rng);
     ASSERT_TRUE(f);
@@ -77,7 +77,7 @@ TEST(Parallax, IsNotSignificantByChance)
   for (std::uint64_t seed = 1; seed <= 20; ++seed)
   {
     const PlaneScene plane(0, 150, seed);
-    const Parallax parallax(plane.scene.homography, plane.pairs, THRESHOLD);
+    const Parallax parallax(plane.scene.homography, plane.pairs, PARALLAX_THRESHOLD);
     Rng rng(seed);
     const auto f = parallax.findFundamental(1500, rng);
     ASSERT_TRUE(f);
@@ -91,10 +91,10 @@ TEST(Parallax, TellsOffWhateverPlaneIsTheBest)
   {
     Rng rng(seed);
     const PlaneScene deep(40, 50, seed);
-    EXPECT_GT(significanceOffBestPlane(deep.scene.fundamental, deep.pairs, THRESHOLD, rng), 5.0) << seed;
+    EXPECT_GT(significanceOffBestPlane(deep.scene.fundamental, deep.pairs, PARALLAX_THRESHOLD, rng), 5.0) << seed;
     // Any epipole agrees with what is on the plane.
     const PlaneScene flat(0, 150, seed);
-    EXPECT_LT(significanceOffBestPlane(flat.scene.fundamental, flat.pairs, THRESHOLD, rng), 1.0) << seed;
+    EXPECT_LT(significanceOffBestPlane(flat.scene.fundamental, flat.pairs, PARALLAX_THRESHOLD, rng), 1.0) << seed;
   }
 }
 
@@ -116,14 +116,14 @@ TEST(Parallax, IsSeenWhereItIsSmallAndMatchesAreExact)
     const Eigen::Vector2d towards = (epipole.hnormalized() - pair.current).normalized();
     pair.current += uniform(rng, 1.0, 2.5) * towards;
   }
-  EXPECT_LT(Parallax(scene.homography, pairs, THRESHOLD).significance(scene.fundamental), 0.0);
-  EXPECT_GT(significanceOffBestPlane(scene.fundamental, pairs, THRESHOLD, rng), 5.0);
+  EXPECT_LT(Parallax(scene.homography, pairs, PARALLAX_THRESHOLD).significance(scene.fundamental), 0.0);
+  EXPECT_GT(significanceOffBestPlane(scene.fundamental, pairs, PARALLAX_THRESHOLD, rng), 5.0);
 }
 
 TEST(Parallax, OfAPlaneAloneIsNone)
 {
   const PlaneScene plane(0, 0, 3);
-  const Parallax parallax(plane.scene.homography, plane.pairs, THRESHOLD);
+  const Parallax parallax(plane.scene.homography, plane.pairs, PARALLAX_THRESHOLD);
   Rng rng(1);
   EXPECT_FALSE(parallax.findFundamental(100, rng));
   EXPECT_LT(parallax.significance(plane.scene.fundamental), 0.0);

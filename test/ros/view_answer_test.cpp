@@ -79,7 +79,7 @@ TEST_F(ViewAnswerTest, OneOfSeveralIsEnough)
 {
   ViewAnswer other("matches", "/line_matches");
   answer_.expect("dock", "goal");
-  other.want("dock", "goal");
+  other.expect("dock", "goal");
   answer_.add(about("dock", "goal", "too small"));
   EXPECT_NE(missingAnswer({ &answer_, &other }), "");
   other.add(about("dock", "goal"));

@@ -21,7 +21,7 @@ namespace view_servo
 {
 namespace
 {
-const Eigen::Matrix3d K = test::cameraMatrix(600.0, 600.0, 320.0, 240.0);
+const Eigen::Matrix3d FILTERED_K = test::cameraMatrix(600.0, 600.0, 320.0, 240.0);
 
 /** A camera that moves before a plane, with the homographies that noisy points give. */
 class Approach
@@ -67,7 +67,7 @@ public:
 
   Eigen::Matrix3d measure(double part, double noise)
   {
-    const Eigen::Matrix3d h = K * truth(part).matrix() * K.inverse();
+    const Eigen::Matrix3d h = FILTERED_K * truth(part).matrix() * FILTERED_K.inverse();
     Correspondences pairs;
     for (const Eigen::Vector2d& point : points_)
     {
@@ -82,7 +82,7 @@ public:
 
   void addTo(PlaneFilter& filter, double part, double noise)
   {
-    filter.add(cameraInOdom(part), measure(part, noise), K, points_);
+    filter.add(cameraInOdom(part), measure(part, noise), FILTERED_K, points_);
   }
   const Points& points() const
   {
@@ -124,11 +124,11 @@ TEST(PlaneFilter, KnowsNothingAtFirst)
   EXPECT_FALSE(filter.estimate());
   const Points seen{ { 200.0, 200.0 }, { 400.0, 300.0 } };
   const Eigen::Matrix3d mirror = Eigen::Vector3d(-1.0, 1.0, 1.0).asDiagonal();
-  filter.add(Eigen::Isometry3d::Identity(), mirror, K, seen);
+  filter.add(Eigen::Isometry3d::Identity(), mirror, FILTERED_K, seen);
   EXPECT_FALSE(filter.estimate());
   // A camera that has only turned tells its rotation, but no plane.
   const Eigen::Matrix3d turn = Eigen::AngleAxisd(0.2, Eigen::Vector3d(0.6, 0.0, 0.8)).toRotationMatrix();
-  filter.add(Eigen::Isometry3d::Identity(), K * turn * K.inverse(), K, seen);
+  filter.add(Eigen::Isometry3d::Identity(), FILTERED_K * turn * FILTERED_K.inverse(), FILTERED_K, seen);
   ASSERT_TRUE(filter.estimate());
   EXPECT_FALSE(filter.estimate()->normal_known);
   EXPECT_FALSE(filter.estimate()->distance);
@@ -149,7 +149,7 @@ TEST(PlaneFilter, FindsPlaneDistanceAndMotionOnTheWay)
     {
       const double part = 0.9 * i / STEPS;
       const Eigen::Matrix3d h = approach.measure(part, 0.3);
-      filter.add(approach.cameraInOdom(part), h, K, approach.points());
+      filter.add(approach.cameraInOdom(part), h, FILTERED_K, approach.points());
       const auto estimate = filter.estimate();
       ASSERT_TRUE(estimate) << seed;
       if (!estimate->ambiguous)
@@ -164,7 +164,7 @@ TEST(PlaneFilter, FindsPlaneDistanceAndMotionOnTheWay)
         EXPECT_GT(estimate->motion.normal.dot(approach.normal()), std::cos(3.0 * DEGREE)) << seed << ", " << i;
         const EuclideanHomography truth = approach.truth(part);
         double best = 1e9;
-        for (const EuclideanHomography& solution : decomposeHomography(h, K, approach.points()))
+        for (const EuclideanHomography& solution : decomposeHomography(h, FILTERED_K, approach.points()))
         {
           best = std::min(best, rotationError(solution.rotation, truth.rotation));
         }
@@ -219,7 +219,7 @@ TEST(PlaneFilter, DoesWithoutOdometry)
   for (int i = 0; i <= 60; ++i)
   {
     const double part = i / 80.0;
-    filter.add(std::nullopt, approach.measure(part, 0.2), K, approach.points());
+    filter.add(std::nullopt, approach.measure(part, 0.2), FILTERED_K, approach.points());
   }
   const auto estimate = filter.estimate();
   ASSERT_TRUE(estimate);
@@ -235,7 +235,7 @@ TEST(PlaneFilter, StaysAmbiguousWhereNothingTells)
   for (std::uint64_t seed = 1; seed <= 20; ++seed)
   {
     Approach approach(seed);
-    if (decomposeHomography(approach.measure(0.1, 0.0), K, approach.points()).size() != 2U)
+    if (decomposeHomography(approach.measure(0.1, 0.0), FILTERED_K, approach.points()).size() != 2U)
     {
       continue;
     }

@@ -23,7 +23,7 @@ namespace test
 {
 namespace
 {
-const cv::Size SIZE(480, 360);
+const cv::Size VIEW_SIZE(480, 360);
 
 /** The picture in half its size, at a place. */
 Eigen::Matrix3d placed(double u, double v)
@@ -44,7 +44,7 @@ protected:
   static void expectAt(const Eigen::Matrix3d& h, const PlaneFinder::Answer& answer)
   {
     ASSERT_TRUE(answer.h) << answer.reason;
-    EXPECT_LT(cornerError(*answer.h, h, SIZE), 1.5);
+    EXPECT_LT(cornerError(*answer.h, h, VIEW_SIZE), 1.5);
     EXPECT_TRUE(answer.reason.empty()) << answer.reason;
     EXPECT_GE(answer.inliers.size(), 20u);
     for (const Correspondence& pair : answer.inliers)
@@ -64,14 +64,14 @@ protected:
   /** The picture side by side with itself. */
   cv::Mat twice() const
   {
-    cv::Mat both = warpedPicture(picture_, left_, SIZE);
-    warpedPicture(picture_, right_, SIZE).colRange(246, 476).copyTo(both.colRange(246, 476));
+    cv::Mat both = warpedPicture(picture_, left_, VIEW_SIZE);
+    warpedPicture(picture_, right_, VIEW_SIZE).colRange(246, 476).copyTo(both.colRange(246, 476));
     return both;
   }
 
   const Eigen::Matrix3d left_ = placed(4.0, 90.0);
   const Eigen::Matrix3d right_ = placed(246.0, 90.0);
-  const cv::Mat picture_ = texturedPicture(1, SIZE);
+  const cv::Mat picture_ = texturedPicture(1, VIEW_SIZE);
   const PlaneFinder finder_{ PointViewMatcherParams() };
   const std::shared_ptr<const PreparedImage> view_ =
       std::make_shared<const PreparedImage>(picture_, cv::Rect(), finder_.features());
@@ -79,8 +79,8 @@ protected:
 
 TEST_F(PlaneFinderTest, FindsTheView)
 {
-  expectAt(exampleHomography(), find(warpedPicture(picture_, exampleHomography(), SIZE)));
-  expectAt(left_, find(warpedPicture(picture_, left_, SIZE)));
+  expectAt(exampleHomography(), find(warpedPicture(picture_, exampleHomography(), VIEW_SIZE)));
+  expectAt(left_, find(warpedPicture(picture_, left_, VIEW_SIZE)));
 }
 
 TEST_F(PlaneFinderTest, FindsARegion)
@@ -88,7 +88,7 @@ TEST_F(PlaneFinderTest, FindsARegion)
   const cv::Rect region(120, 90, 240, 180);
   const auto view = std::make_shared<const PreparedImage>(picture_, region, finder_.features());
   const PlaneFinder::Answer answer =
-      finder_.find({ view, warpedPicture(picture_, exampleHomography(), SIZE), std::nullopt });
+      finder_.find({ view, warpedPicture(picture_, exampleHomography(), VIEW_SIZE), std::nullopt });
   expectAt(exampleHomography(), answer);
   for (const Correspondence& pair : answer.inliers)
   {
@@ -104,7 +104,7 @@ TEST_F(PlaneFinderTest, FindsTheViewInAnImageOfAnotherSize)
 
 TEST_F(PlaneFinderTest, SaysWhyAViewIsNotFound)
 {
-  expectNotFound("no geometry", find(texturedPicture(5, SIZE)));
+  expectNotFound("no geometry", find(texturedPicture(5, VIEW_SIZE)));
 }
 
 TEST_F(PlaneFinderTest, RefusesAViewThatIsSeenTwice)
@@ -122,13 +122,13 @@ TEST_F(PlaneFinderTest, FindsTheOneOfTwoThatIsExpected)
 
 TEST_F(PlaneFinderTest, FindsTheViewElsewhereThanExpected)
 {
-  expectAt(right_, find(warpedPicture(picture_, right_, SIZE), left_));
+  expectAt(right_, find(warpedPicture(picture_, right_, VIEW_SIZE), left_));
 }
 
 /** A last place that is none, as after an estimate at the horizon. */
 TEST_F(PlaneFinderTest, DoesNotTrustALastPlaceWithoutSense)
 {
-  const cv::Mat image = warpedPicture(picture_, left_, SIZE);
+  const cv::Mat image = warpedPicture(picture_, left_, VIEW_SIZE);
   expectAt(left_, find(image, Eigen::Matrix3d::Zero()));
   expectAt(left_, find(image, Eigen::Matrix3d::Constant(std::nan(""))));
   expectNotFound("seen in two places", find(twice(), Eigen::Matrix3d::Constant(std::nan(""))));
@@ -137,8 +137,8 @@ TEST_F(PlaneFinderTest, DoesNotTrustALastPlaceWithoutSense)
 TEST_F(PlaneFinderTest, SaysWhatIsWrongWithAnImage)
 {
   expectNotFound("the image is empty", find(cv::Mat()));
-  expectNotFound("too few corners", find(cv::Mat(SIZE, CV_8UC1, cv::Scalar(0))));
-  EXPECT_THROW(find(cv::Mat(SIZE, CV_8UC3, cv::Scalar(0))), std::invalid_argument);
+  expectNotFound("too few corners", find(cv::Mat(VIEW_SIZE, CV_8UC1, cv::Scalar(0))));
+  EXPECT_THROW(find(cv::Mat(VIEW_SIZE, CV_8UC3, cv::Scalar(0))), std::invalid_argument);
 }
 
 TEST_F(PlaneFinderTest, CanBeGivenUp)
@@ -146,12 +146,13 @@ TEST_F(PlaneFinderTest, CanBeGivenUp)
   const auto given_up = [] {
     return true;
   };
-  expectNotFound("given up", finder_.find({ view_, warpedPicture(picture_, left_, SIZE), std::nullopt }, given_up));
+  expectNotFound("given up",
+                 finder_.find({ view_, warpedPicture(picture_, left_, VIEW_SIZE), std::nullopt }, given_up));
 }
 
 TEST_F(PlaneFinderTest, SaysWhatIsWrongWithAView)
 {
-  const cv::Mat black(SIZE, CV_8UC1, cv::Scalar(0));
+  const cv::Mat black(VIEW_SIZE, CV_8UC1, cv::Scalar(0));
   const auto view = std::make_shared<const PreparedImage>(black, cv::Rect(), finder_.features());
   expectNotFound("too few corners", finder_.find({ view, picture_, std::nullopt }));
   expectNotFound("too few corners", finder_.find({ view, black, std::nullopt }));

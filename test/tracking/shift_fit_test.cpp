@@ -13,7 +13,7 @@ namespace view_servo
 {
 namespace
 {
-constexpr double WIDTH = 4.0;  // [px]
+constexpr double FIT_WIDTH = 4.0;  // [px]
 
 /** Near the identity: it shifts the places below by less than 3 px. */
 Eigen::Matrix3d smallChange()
@@ -38,7 +38,7 @@ Points places()
 
 ShiftFit fitOf(const Eigen::Matrix3d& h)
 {
-  ShiftFit fit(WIDTH);
+  ShiftFit fit(FIT_WIDTH);
   for (const Eigen::Vector2d& place : places())
   {
     fit.add(place, transfer(h, place) - place, Eigen::Matrix2d::Identity());
@@ -94,21 +94,21 @@ TEST(ShiftFit, OnlyTheDirectionThatIsKnownCounts)
 
 TEST(ShiftFit, IsEmptyWhenTheShiftsLeaveItOpen)
 {
-  EXPECT_FALSE(ShiftFit(WIDTH).solve().has_value());
-  ShiftFit one_place(WIDTH);
-  ShiftFit far(WIDTH);
+  EXPECT_FALSE(ShiftFit(FIT_WIDTH).solve().has_value());
+  ShiftFit one_place(FIT_WIDTH);
+  ShiftFit far(FIT_WIDTH);
   for (int i = 0; i < 6; ++i)
   {
     one_place.add({ 100.0, 100.0 }, { 0.5, 0.0 }, Eigen::Matrix2d::Identity());
   }
   for (const Eigen::Vector2d& place : places())
   {
-    far.add(place, { 2.0 * WIDTH, 0.0 }, Eigen::Matrix2d::Identity());
+    far.add(place, { 2.0 * FIT_WIDTH, 0.0 }, Eigen::Matrix2d::Identity());
   }
   EXPECT_FALSE(one_place.solve().has_value());
   EXPECT_FALSE(far.solve().has_value());
   double rms = -1.0;
-  EXPECT_TRUE(far.supporting(Eigen::Matrix3d::Identity(), WIDTH, rms).empty());
+  EXPECT_TRUE(far.supporting(Eigen::Matrix3d::Identity(), FIT_WIDTH, rms).empty());
   EXPECT_EQ(rms, 0.0);
 }
 

@@ -19,7 +19,7 @@ namespace
 {
 using test::MatchesOfAll;
 
-const cv::Size SIZE(640, 480);
+const cv::Size WALL_SIZE(640, 480);
 constexpr int PERIOD = 72;  // [px]
 
 /** A wall of windows, all alike, each of a few panes. */
@@ -66,9 +66,9 @@ class RepeatedWindowsTest : public testing::TestWithParam<std::uint64_t>
 TEST_P(RepeatedWindowsTest, AreRefusedByAll)
 {
   // The camera has moved by one window: a match that is one window off is as good as the right one.
-  const cv::Mat picture = wall(GetParam(), SIZE + cv::Size(PERIOD, 0));
-  const MatchesOfAll found = answers(photographed(picture(cv::Rect(cv::Point(0, 0), SIZE))),
-                                     photographed(picture(cv::Rect(cv::Point(PERIOD, 0), SIZE))));
+  const cv::Mat picture = wall(GetParam(), WALL_SIZE + cv::Size(PERIOD, 0));
+  const MatchesOfAll found = answers(photographed(picture(cv::Rect(cv::Point(0, 0), WALL_SIZE))),
+                                     photographed(picture(cv::Rect(cv::Point(PERIOD, 0), WALL_SIZE))));
   for (const ViewMatch& match : { found.points, found.points_with_depth, found.lines, found.scene })
   {
     EXPECT_EQ(match.outcome, MatchOutcome::NO_GEOMETRY) << match.message;
@@ -84,9 +84,9 @@ TEST_P(RepeatedWindowsTest, AreRefusedByAll)
 
 TEST_P(RepeatedWindowsTest, AreRefusedByAllWhenTheCameraHasTurned)
 {
-  const cv::Mat picture = wall(GetParam(), SIZE + cv::Size(PERIOD, 0));
-  const MatchesOfAll found = answers(photographed(picture(cv::Rect(cv::Point(0, 0), SIZE)), -2.0),
-                                     photographed(picture(cv::Rect(cv::Point(PERIOD, 0), SIZE)), 2.0));
+  const cv::Mat picture = wall(GetParam(), WALL_SIZE + cv::Size(PERIOD, 0));
+  const MatchesOfAll found = answers(photographed(picture(cv::Rect(cv::Point(0, 0), WALL_SIZE)), -2.0),
+                                     photographed(picture(cv::Rect(cv::Point(PERIOD, 0), WALL_SIZE)), 2.0));
   for (const ViewMatch& match : { found.points, found.points_with_depth, found.lines, found.scene })
   {
     EXPECT_EQ(match.outcome, MatchOutcome::NO_GEOMETRY) << match.message;
@@ -97,7 +97,7 @@ INSTANTIATE_TEST_SUITE_P(Walls, RepeatedWindowsTest, testing::Values(1, 2, 3));
 
 TEST(RepeatedStructure, IsAllowedWhereThatIsAskedFor)
 {
-  const cv::Mat picture = wall(1, SIZE);
+  const cv::Mat picture = wall(1, WALL_SIZE);
   const MatchesOfAll found = answers(photographed(picture), photographed(picture), false);
   for (const ViewMatch& match : { found.points, found.lines, found.scene })
   {
@@ -108,14 +108,14 @@ TEST(RepeatedStructure, IsAllowedWhereThatIsAskedFor)
 TEST(RepeatedStructure, IsNoneWhereMostOfTheViewIsUnique)
 {
   // Windows between pictures of which each is another.
-  cv::Mat picture = test::texturedPicture(7, SIZE);
+  cv::Mat picture = test::texturedPicture(7, WALL_SIZE);
   wall(1, cv::Size(4 * PERIOD, 3 * PERIOD)).copyTo(picture(cv::Rect(160, 120, 4 * PERIOD, 3 * PERIOD)));
   const Eigen::Matrix3d h = test::exampleHomography();
-  const MatchesOfAll found = answers(photographed(picture), photographed(test::warpedPicture(picture, h, SIZE)));
+  const MatchesOfAll found = answers(photographed(picture), photographed(test::warpedPicture(picture, h, WALL_SIZE)));
   for (const ViewMatch& match : { found.points, found.lines, found.scene })
   {
     EXPECT_EQ(match.outcome, MatchOutcome::MATCHED) << match.message;
-    EXPECT_LT(test::cornerError(match.matrix, h, SIZE), 2.0);
+    EXPECT_LT(test::cornerError(match.matrix, h, WALL_SIZE), 2.0);
   }
 }
 
