@@ -176,7 +176,7 @@ std::string decodedEncoding(const std::string& format, int type)
 {
   namespace enc = sensor_msgs::image_encodings;
   const std::size_t separator = format.find(';');
-  const std::string original = separator == std::string::npos ? "" : format.substr(0, separator);
+  std::string original = separator == std::string::npos ? "" : format.substr(0, separator);
   const bool is_rgb = enc::isColor(original) && format.find("compressed bgr", separator) == std::string::npos;
   const bool has_16_bits = CV_MAT_DEPTH(type) == CV_16U;
   switch (CV_MAT_CN(type))
