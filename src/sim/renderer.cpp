@@ -13,10 +13,7 @@
 #include <cmath>
 #include <cstddef>
 #include <cstdlib>
-#include <mutex>
-#include <sstream>
 #include <stdexcept>
-#include <string>
 #include <utility>
 
 namespace view_servo::sim
@@ -35,29 +32,10 @@ double shade(const Surface& surface)
   return surface.brightness * (AMBIENT + (1.0 - AMBIENT) * (0.5 + 0.5 * normal.dot(LIGHT_DIRECTION)));
 }
 
-/**
- * Whether contexts of several threads have to take turns: the drawing buffers of Mesa 20.3's contexts are freed by one thread
- * while another draws into them. 22.3 does no such thing. Those between were not tried, and take turns, too.
- * To be asked while a context is current.
- */
-bool contextsTakeTurns()
-{
-  const std::string version(reinterpret_cast<const char*>(glGetString(GL_VERSION)));  // such as "4.5 Mesa 22.3.6"
-  const std::size_t mesa = version.find("Mesa ");
-  std::istringstream numbers(mesa == std::string::npos ? "" : version.substr(mesa + 5));
-  int major = 0;
-  int minor = 0;
-  char dot = 0;
-  const bool known = static_cast<bool>(numbers >> major >> dot >> minor);
-  return !known || std::pair(major, minor) < std::pair(22, 3);
-}
-
 }  // namespace
 
 struct SimulatedCamera::Context
 {
-  using Turn = std::unique_lock<std::mutex>;
-
   OSMesaContext context = nullptr;
   std::vector<unsigned char> buffer;  // RGBA
   cv::Size size;
@@ -70,10 +48,7 @@ struct SimulatedCamera::Context
     // too, one is quicker. Who sets the variable has the last word.
     constexpr int KEEP_WHAT_IS_SET = 0;
     setenv("LP_NUM_THREADS", "1", KEEP_WHAT_IS_SET);
-    {
-      const Turn turn(mutex());
-      context = OSMesaCreateContextExt(OSMESA_RGBA, DEPTH_BITS, 0, 0, nullptr);
-    }
+    context = OSMesaCreateContextExt(OSMESA_RGBA, DEPTH_BITS, 0, 0, nullptr);
     buffer.resize(4 * static_cast<std::size_t>(size.area()));
     if (context == nullptr)
     {
@@ -83,7 +58,6 @@ struct SimulatedCamera::Context
 
   ~Context()
   {
-    const Turn turn(mutex());
     OSMesaDestroyContext(context);
   }
 
@@ -96,27 +70,13 @@ struct SimulatedCamera::Context
     OSMesaMakeCurrent(nullptr, nullptr, GL_UNSIGNED_BYTE, 0, 0);
   }
 
-  static std::mutex& mutex()
+  void makeCurrent()
   {
-    static std::mutex mutex;
-    return mutex;
-  }
-
-  /** @return to be kept until release(). */
-  Turn makeCurrent()
-  {
-    Turn turn(mutex());
     if (OSMesaMakeCurrent(context, buffer.data(), GL_UNSIGNED_BYTE, size.width, size.height) != GL_TRUE)
     {
       throw std::runtime_error("OSMesa refuses an image of " + std::to_string(size.width) + " x " +
                                std::to_string(size.height) + " pixels");
     }
-    static const bool takes_turns = contextsTakeTurns();
-    if (!takes_turns)
-    {
-      turn.unlock();
-    }
-    return turn;
   }
 
   static std::vector<GLuint> loadTextures(const std::vector<cv::Mat>& pictures)
@@ -141,7 +101,7 @@ struct SimulatedCamera::Context
 
   void load(const World& world, const std::vector<std::string>& groups)
   {
-    const Turn turn = makeCurrent();
+    makeCurrent();
     const std::vector<GLuint> textures = loadTextures(world.textures);
     glEnable(GL_DEPTH_TEST);
     glEnable(GL_TEXTURE_2D);
@@ -179,7 +139,7 @@ struct SimulatedCamera::Context
   /** The first row of the image ends up first in the buffer: OpenGL's lowest. */
   void draw(const Eigen::Matrix3d& k, const Eigen::Isometry3d& camera)
   {
-    const Turn turn = makeCurrent();
+    makeCurrent();
     glViewport(0, 0, size.width, size.height);
     glClear(GL_COLOR_BUFFER_BIT | GL_DEPTH_BUFFER_BIT);
     // A pixel's centre is at whole numbers in K's coordinates, at halves in OpenGL's.
