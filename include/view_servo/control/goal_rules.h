@@ -62,7 +62,8 @@ struct Verdict
  * state cannot be trusted, it is disabled, the goal is cancelled, the robot has arrived, the driver has given up, the
  * time is over, nobody listens, an input is missing, the robot is held. The last three count only
  * once the goal has begun, not while it is prepared. A missing input makes the robot stand, and ends the goal after
- * `patience`. Where none of them holds, it drives if the driver is in state DRIVING, and else stands. A driver that gives up may do so for want of an input: the reason says both then.
+ * `patience`. Where none of them holds, it drives if the driver is in state DRIVING, and else stands. A driver that
+ * gives up may do so for want of an input: the reason says both then.
  */
 Verdict judge(const Circumstances& circumstances, const Progress& progress);
 

@@ -38,8 +38,8 @@ public:
   explicit StillPose(const StillPoseParams& params = {});
 
   /**
-   * The next sample. It begins anew when it is not newer than the last, is more than max_gap newer, or has another number
-   * of points.
+   * The next sample. It begins anew when it is not newer than the last, is more than max_gap newer, or has another
+   * number of points.
    * @return the mean of the last samples, with the newest stamp, while they stand still; else empty.
    */
   std::optional<ArmSample> add(const ArmSample& sample);

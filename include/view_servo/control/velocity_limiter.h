@@ -38,7 +38,8 @@ inline const VelocityLimits ARM_LIMITS{ 0.15, 0.6, 0.5, 2.0 };
 
 /**
  * Keeps velocities within limits. Linear and angular part are scaled by one factor, so that their ratio stays, and each
- * change is limited in the same way, except that a stop is immediate. Its first LINEAR components are a linear velocity, the ANGULAR others a turn rate.
+ * change is limited in the same way, except that a stop is immediate. A velocity's first LINEAR components are a linear
+ * velocity, the ANGULAR others a turn rate.
  */
 template <int LINEAR, int ANGULAR>
 class VelocityLimiter

@@ -43,7 +43,7 @@ struct GuidedMatch
  * patch is flat, or that are sent nearer to the image's border than the radius and the patch need. The others come in
  * the order of `corners`.
  * @param reference, current 8-bit, one channel.
- * @param radius of the search region around the prediction, in each direction, rounded up to whole pixels, at least 1 [px].
+ * @param radius of the search region around the prediction, in each direction, rounded up to whole pixels >= 1 [px].
  */
 std::vector<GuidedMatch> searchAlongHomography(const cv::Mat& reference, const std::vector<Corner>& corners,
                                                const cv::Mat& current, const Eigen::Matrix3d& h, double radius,

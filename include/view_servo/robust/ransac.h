@@ -73,7 +73,8 @@ struct RansacResult
  *  - `std::size_t size() const`: number of data,
  *  - `bool accepts(const std::vector<int>& sample) const`: cheap test before solving,
  *  - `void solve(const std::vector<int>& sample, std::vector<Model>& models) const`: appends the minimal solutions,
- *  - `double error(const Model&, std::size_t i) const`: squared error of datum i, in the unit of the data squared, possibly infinite,
+ *  - `double error(const Model&, std::size_t i) const`: squared error of datum i, in the unit of the data squared,
+ *    possibly infinite,
  *  - `std::optional<Model> refit(const Model&, const std::vector<int>& inliers) const`: fit to many.
  *
  * The same generator state and data give the same result on every machine.
