@@ -4,8 +4,8 @@
 
 #include "experiments/input_file.h"
 #include "experiments/parallel.h"
+#include "experiments/shipped_worlds.h"
 #include "experiments/statistics.h"
-#include "sim/world_reader.h"
 #include "tools/package_folder.h"
 #include "trials/arm_trial.h"
 #include "view_servo/parameters/numbers.h"
@@ -102,16 +102,6 @@ struct Result
   double least_margin;  ///< of the chosen point from the image's border [px]
 };
 
-std::map<std::string, sim::World> readArmWorlds()
-{
-  std::map<std::string, sim::World> worlds;
-  for (const char* world : ARM_WORLDS)
-  {
-    worlds.emplace(world, sim::findWorld(world, packageFolder() / "config" / "worlds"));
-  }
-  return worlds;
-}
-
 /** All runs, those from the same start beside each other. */
 std::vector<ArmRun> runsOf(const ExperimentContext& context)
 {
@@ -202,7 +192,7 @@ void runArmExperiment(const ExperimentContext& context, std::ostream& csv)
 {
   std::ifstream urdf_file = openForReading(packageFolder() / "urdf" / "puma560.urdf");
   const std::string urdf{ std::istreambuf_iterator<char>(urdf_file), std::istreambuf_iterator<char>() };
-  const std::map<std::string, sim::World> worlds = readArmWorlds();
+  const Worlds worlds = readShippedWorlds({ ARM_WORLDS.begin(), ARM_WORLDS.end() });
   const std::vector<ArmRun> runs = runsOf(context);
   std::vector<std::string> lines(runs.size());
   std::map<std::string, Row> table;

@@ -5,8 +5,8 @@
 #include "experiments/arm_data.h"
 #include "experiments/input_file.h"
 #include "experiments/parallel.h"
+#include "experiments/shipped_worlds.h"
 #include "experiments/statistics.h"
-#include "sim/world_reader.h"
 #include "tools/package_folder.h"
 #include "trials/hand_eye_trial.h"
 #include "view_servo/geometry/hand_eye.h"
@@ -221,11 +221,7 @@ void runHandEyeExperiment(const ExperimentContext& context, std::ostream& csv)
   std::ifstream urdf_file = openForReading(packageFolder() / "urdf" / "puma560.urdf");
   const std::string urdf{ std::istreambuf_iterator<char>(urdf_file), std::istreambuf_iterator<char>() };
   const auto runs = static_cast<std::size_t>(context.runsOf(HAND_EYE_RUNS));
-  std::map<std::string, sim::World> worlds;
-  for (const char* world : HAND_EYE_WORLDS)
-  {
-    worlds.emplace(world, sim::findWorld(world, packageFolder() / "config" / "worlds"));
-  }
+  const Worlds worlds = readShippedWorlds({ HAND_EYE_WORLDS.begin(), HAND_EYE_WORLDS.end() });
   std::vector<std::string> lines(runs * HAND_EYE_WORLDS.size());
   std::map<std::string, Row> table;
   std::mutex mutex;

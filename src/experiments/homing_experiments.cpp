@@ -4,9 +4,8 @@
 
 #include "experiments/indoor_walk.h"
 #include "experiments/parallel.h"
+#include "experiments/shipped_worlds.h"
 #include "experiments/statistics.h"
-#include "sim/world_reader.h"
-#include "tools/package_folder.h"
 #include "trials/homing_trial.h"
 #include "view_servo/control/heading_hypotheses.h"
 #include "view_servo/geometry/camera.h"
@@ -139,16 +138,11 @@ private:
   std::vector<double> in_sight_;
 };
 
-using Worlds = std::map<std::string, sim::World>;
+constexpr std::array<const char*, 3> HOMING_WORLDS = { "desk", "cabinet", "corridor" };
 
-Worlds readWorlds()
+Worlds readHomingWorlds()
 {
-  Worlds worlds;
-  for (const char* name : { "desk", "cabinet", "corridor" })
-  {
-    worlds.emplace(name, sim::findWorld(name, packageFolder() / "config" / "worlds"));
-  }
-  return worlds;
+  return readShippedWorlds({ HOMING_WORLDS.begin(), HOMING_WORLDS.end() });
 }
 
 /** Runs from random starts under both conditions. @param max_yaw by which starts are turned at most [rad]. */
@@ -156,10 +150,9 @@ std::vector<HomingRun> randomRuns(const Worlds& worlds, BaseKind base, double ma
 {
   std::vector<HomingRun> runs;
   Rng rng(context.seedOf(HOMING_STARTS, HOMING_STARTS.seed));
-  const std::array<const char*, 3> names = { "desk", "cabinet", "corridor" };
   for (int i = 0; i < context.runsOf(HOMING_STARTS); ++i)
   {
-    const std::string name = names[static_cast<std::size_t>(i) % names.size()];
+    const std::string name = HOMING_WORLDS[static_cast<std::size_t>(i) % HOMING_WORLDS.size()];
     const PlanarPose start = sim::randomStart(worlds.at(name), rng, max_yaw);
     const std::uint64_t seed = context.seedOf(HOMING_STARTS, static_cast<std::uint64_t>(i) + 2);
     for (const bool hard : { false, true })
@@ -207,7 +200,7 @@ void home(const std::vector<HomingRun>& runs, const Worlds& worlds, const Experi
 void runHomingExperiment(const ExperimentContext& context, std::ostream& csv)
 {
   constexpr double MAX_YAW = M_PI / 18.0;
-  const Worlds worlds = readWorlds();
+  const Worlds worlds = readHomingWorlds();
   std::vector<HomingRun> runs;
   for (const char* name : { "desk", "cabinet" })
   {
@@ -225,7 +218,7 @@ void runHomingExperiment(const ExperimentContext& context, std::ostream& csv)
 void runHomingDifferentialExperiment(const ExperimentContext& context, std::ostream& csv)
 {
   constexpr double MAX_YAW = M_PI / 9.0;
-  const Worlds worlds = readWorlds();
+  const Worlds worlds = readHomingWorlds();
   home(randomRuns(worlds, BaseKind::DIFFERENTIAL, MAX_YAW, context), worlds, context, csv);
 }
 

@@ -3,8 +3,7 @@
 #include "experiments/routes_experiment.h"
 
 #include "experiments/parallel.h"
-#include "sim/world_reader.h"
-#include "tools/package_folder.h"
+#include "experiments/shipped_worlds.h"
 #include "trials/route_trial.h"
 #include "view_servo/parameters/numbers.h"
 #include "view_servo/robust/quantile.h"
@@ -46,7 +45,7 @@ std::vector<PlanarPose> randomWaypoints(const sim::World& world, Rng& rng)
   return waypoints;
 }
 
-std::vector<RouteRunOrder> makeOrders(const std::map<std::string, sim::World>& worlds, const ExperimentContext& context)
+std::vector<RouteRunOrder> makeOrders(const Worlds& worlds, const ExperimentContext& context)
 {
   std::vector<RouteRunOrder> orders;
   Rng rng(context.seedOf(ROUTES, ROUTES.seed));
@@ -126,11 +125,7 @@ struct RouteSummary
 
 void runRoutesExperiment(const ExperimentContext& context, std::ostream& csv)
 {
-  std::map<std::string, sim::World> worlds;
-  for (const char* name : { "desk", "corridor" })
-  {
-    worlds.emplace(name, sim::findWorld(name, packageFolder() / "config" / "worlds"));
-  }
+  const Worlds worlds = readShippedWorlds({ "desk", "corridor" });
   const std::vector<RouteRunOrder> orders = makeOrders(worlds, context);
   std::vector<std::string> rows(orders.size());
   std::map<std::string, RouteSummary> summaries;  // of conditions

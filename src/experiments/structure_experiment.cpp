@@ -3,9 +3,8 @@
 #include "experiments/structure_experiment.h"
 
 #include "experiments/parallel.h"
+#include "experiments/shipped_worlds.h"
 #include "sim/visibility.h"
-#include "sim/world_reader.h"
-#include "tools/package_folder.h"
 #include "trials/homing_trial.h"
 #include "view_servo/parameters/numbers.h"
 #include "view_servo/robust/quantile.h"
@@ -111,7 +110,7 @@ std::vector<double> depthErrors(const Lesson& lesson)
 Lesson learn(const std::string& name, BaseKind base, std::uint64_t seed)
 {
   constexpr int MOST_STARTS = 10;
-  Lesson lesson{ sim::findWorld(name, packageFolder() / "config" / "worlds"), base, {} };
+  Lesson lesson{ readShippedWorld(name), base, {} };
   Rng rng(seed);
   for (int i = 0; i < MOST_STARTS && lesson.structure.points.empty(); ++i)
   {
