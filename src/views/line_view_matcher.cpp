@@ -49,17 +49,6 @@ bool isBetter(const SegmentMatch& a, const SegmentMatch& b)
   return quality(a) > quality(b);
 }
 
-Correspondences positions(const std::vector<MatchedPoint>& points)
-{
-  Correspondences pairs;
-  pairs.reserve(points.size());
-  for (const MatchedPoint& point : points)
-  {
-    pairs.push_back(point.position);
-  }
-  return pairs;
-}
-
 /** One match of two images. */
 class LineAttempt
 {
@@ -121,7 +110,7 @@ public:
    */
   RansacStatistics dropInconsistentRegions()
   {
-    Correspondences pairs = positions(junctions());
+    Correspondences pairs = positionsOf(junctions());
     for (const LineRegion& region : regions_)
     {
       for (const SegmentMatch& match : region.matches)
@@ -440,7 +429,7 @@ bool addPoints(LineAttempt& attempt, const SegmentPairs& lines, const LinePlanes
   std::stable_sort(result.matches.begin(), result.matches.end(),
                    [](const MatchedPoint& a, const MatchedPoint& b) { return a.score > b.score; });
   const std::optional<Eigen::Matrix3d> f =
-      fundamentalOf(positions(result.matches), lines, planes, params, attempt.rng());
+      fundamentalOf(positionsOf(result.matches), lines, planes, params, attempt.rng());
   if (f)
   {
     result.fundamental = *f;
@@ -487,7 +476,7 @@ bool isRepeated(const LineFeatures& reference, const LineFeatures& current, cons
   const Eigen::Matrix3d& plane = result.planes.front();
   const Eigen::Matrix3d inverse = plane.inverse();
   constexpr double NEAR = 3.0;  // [px]
-  Correspondences pairs = positions(result.matches);
+  Correspondences pairs = positionsOf(result.matches);
   pairs.erase(std::remove_if(pairs.begin(), pairs.end(),
                              [&](const Correspondence& pair) {
                                return 0.5 * symmetricTransferError(plane, inverse, pair) > NEAR * NEAR;

@@ -45,17 +45,6 @@ struct Plane
   int of_lines;  ///< index among the planes of the line matcher; -1: it came from points
 };
 
-Correspondences positions(const std::vector<MatchedPoint>& matches)
-{
-  Correspondences pairs;
-  pairs.reserve(matches.size());
-  for (const MatchedPoint& match : matches)
-  {
-    pairs.push_back(match.position);
-  }
-  return pairs;
-}
-
 /** Homographies on which several matches agree; what one takes is left out for the next. */
 std::vector<Eigen::Matrix3d> planesOf(Correspondences pairs, double threshold, Rng& rng)
 {
@@ -145,7 +134,7 @@ public:
     {
       matches_.insert(matches_.end(), kind->begin(), kind->end());
     }
-    pairs_ = positions(matches_);
+    pairs_ = positionsOf(matches_);
   }
 
   /** The best fundamental matrix, `other` being one that was found before; true if it stands without its best plane. */
@@ -325,7 +314,7 @@ private:
     std::stable_sort(near.begin(), near.end(),
                      [](const MatchedPoint& a, const MatchedPoint& b) { return a.score > b.score; });
     matches_.insert(matches_.begin(), near.begin(), near.end());
-    pairs_ = positions(matches_);
+    pairs_ = positionsOf(matches_);
   }
 
   /** How many corners a homography sends to where their patch lies in the current image. */
@@ -580,7 +569,7 @@ void addPlanes(const ViewMatch& lines, const ViewMatch& points, double threshold
   {
     attempt.addPlane(lines.planes[i], static_cast<int>(i));
   }
-  for (const Eigen::Matrix3d& h : planesOf(positions(points.matches), threshold, rng))
+  for (const Eigen::Matrix3d& h : planesOf(positionsOf(points.matches), threshold, rng))
   {
     attempt.addPlane(h, -1);
   }

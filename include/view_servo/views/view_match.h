@@ -40,6 +40,18 @@ struct MatchedPoint
   bool inlier;  ///< agrees with the geometry that was found
 };
 
+/** The positions of all matches, in their order. */
+inline Correspondences positionsOf(const std::vector<MatchedPoint>& matches)
+{
+  Correspondences pairs;
+  pairs.reserve(matches.size());
+  for (const MatchedPoint& match : matches)
+  {
+    pairs.push_back(match.position);
+  }
+  return pairs;
+}
+
 /** A line segment matched by LineViewMatcher. */
 struct MatchedLine
 {
