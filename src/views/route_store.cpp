@@ -60,11 +60,6 @@ auto about(const std::string& action, const std::string& name, const Body& body)
   }
 }
 
-fs::path yamlPath(const fs::path& directory, const std::string& name)
-{
-  return directory / (name + ".yaml");
-}
-
 /** @throws std::invalid_argument saying what cannot be. */
 void check(const Route& route)
 {

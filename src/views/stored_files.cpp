@@ -80,6 +80,11 @@ std::optional<std::string> readStoredFile(const fs::path& path, std::uintmax_t m
   }
 }
 
+fs::path yamlPath(const fs::path& directory, const std::string& name)
+{
+  return directory / (name + ".yaml");
+}
+
 std::vector<std::string> namesOfYamlFiles(const fs::path& directory)
 {
   std::vector<std::string> names;

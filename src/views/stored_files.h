@@ -39,6 +39,9 @@ std::string withoutChecksum(const std::string& text, const std::string& what);
 /** All bytes; empty when there is no such file. @param max_size larger files are refused [bytes]. @throws Damage. */
 std::optional<std::string> readStoredFile(const std::filesystem::path& path, std::uintmax_t max_size);
 
+/** The text file of the view or route of that name. */
+std::filesystem::path yamlPath(const std::filesystem::path& directory, const std::string& name);
+
 /**
  * Sorted names, without their ending, of the files NAME.yaml whose names a view can have; none when there is no such
  * directory. @throws std::filesystem::filesystem_error.

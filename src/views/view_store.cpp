@@ -28,11 +28,6 @@ namespace fs = std::filesystem;
 constexpr int FORMAT = 1;
 constexpr std::size_t MAX_NAME_LENGTH = 64;
 
-fs::path yamlPath(const fs::path& directory, const std::string& name)
-{
-  return directory / (name + ".yaml");
-}
-
 constexpr const char* STRUCTURE_ENDING = ".points";
 
 fs::path structurePath(const fs::path& directory, const std::string& name, const std::string& revision)
