@@ -10,7 +10,8 @@ namespace view_servo::check
 {
 namespace
 {
-std::string join(const std::vector<std::string>& names)
+/** The first few of the names, and how many more there are. */
+std::string firstFew(const std::vector<std::string>& names)
 {
   constexpr std::size_t MOST = 4;
   std::string text;
@@ -145,7 +146,7 @@ Findings judgeCommands(const CommandObservations& commands)
     return { error(name, "nobody listens on '" + commands.topic + "'",
                    "start the robot's driver, say cmd_vel:= as its topic is named, or use dry_run:=true") };
   }
-  const std::string found = join(commands.listeners) + " listens on '" + commands.topic + "'";
+  const std::string found = firstFew(commands.listeners) + " listens on '" + commands.topic + "'";
   if (!commands.type.empty() && commands.type != "*" && commands.type != commands.wanted_type)
   {
     return { error(name, found + " for " + commands.type + ", commands are " + commands.wanted_type,
@@ -153,7 +154,7 @@ Findings judgeCommands(const CommandObservations& commands)
   }
   if (!commands.publishers.empty())
   {
-    return { warning(name, found + ", and " + join(commands.publishers) + " publishes there, too",
+    return { warning(name, found + ", and " + firstFew(commands.publishers) + " publishes there, too",
                      "stop it, or put a multiplexer (twist_mux) between, so that one node at a time drives") };
   }
   return { ok(name, found) };
@@ -176,7 +177,7 @@ Findings judgeJoints(const JointObservations& joints)
   }
   if (!joints.unknown.empty())
   {
-    return { error(name, "robot_description has no joints " + join(joints.unknown) + ", of '" + stream.topic + "'",
+    return { error(name, "robot_description has no joints " + firstFew(joints.unknown) + ", of '" + stream.topic + "'",
                    "load the URDF of this arm, or say joint_states:= as its own topic is named") };
   }
   if (!joints.fault.empty())
@@ -186,7 +187,7 @@ Findings judgeJoints(const JointObservations& joints)
   }
   if (!joints.silent.empty())
   {
-    return { warning(name, found + ", without " + join(joints.silent) + " of robot_description",
+    return { warning(name, found + ", without " + firstFew(joints.silent) + " of robot_description",
                      "publish their states, too, else nobody watches their limits") };
   }
   return { ok(name, found + ", all joints of robot_description, within their limits") };

@@ -5,6 +5,7 @@
 #include "check/judgements.h"
 #include "check_ros/ros_graph.h"
 #include "view_servo/images/image_io.h"
+#include "view_servo/parameters/join.h"
 #include "view_servo/parameters/numbers.h"
 #include "view_servo/ros/conversions.h"
 #include "view_servo/ros/node_base.h"
@@ -24,16 +25,6 @@ Twist along(int axis, double amount)
   Twist way = Twist::Zero();
   way[axis] = amount;
   return way;
-}
-
-std::string join(const std::vector<std::string>& texts)
-{
-  std::string joined;
-  for (const std::string& text : texts)
-  {
-    joined += (joined.empty() ? "" : ", ") + text;
-  }
-  return joined;
 }
 
 cv::Mat greyOf(const CameraFrame& frame)
@@ -89,7 +80,7 @@ std::string TestDrive::refusal(const Findings& findings, bool by_hand) const
   }
   if (!in_the_way.empty())
   {
-    return "there are errors: " + join(in_the_way);
+    return "there are errors: " + join(in_the_way, ", ");
   }
   if (by_hand)
   {
@@ -101,7 +92,7 @@ std::string TestDrive::refusal(const Findings& findings, bool by_hand) const
   }
   const std::string topic = robot_.nodeHandle().resolveName(robot_.setup().commandTopic());
   const std::vector<std::string> others = RosGraph().publishers(topic);
-  return others.empty() ? "" : join(others) + " publishes on '" + topic + "', too: stop it first";
+  return others.empty() ? "" : join(others, ", ") + " publishes on '" + topic + "', too: stop it first";
 }
 
 // ----------------------------------------------------------------------------------------------------- measurement

@@ -7,6 +7,7 @@
 #include "hand_eye_problem.h"
 #include "hand_eye_refinement.h"
 #include "hand_eye_start.h"
+#include "view_servo/parameters/join.h"
 
 #include <algorithm>
 #include <cmath>
@@ -21,17 +22,6 @@ namespace
 double sigmaOf(const Eigen::Matrix3d& covariance)
 {
   return std::sqrt(std::max(0.0, singularValues(covariance).values(0)));
-}
-
-/** Lines as one, for a message. */
-std::string joined(const std::vector<std::string>& lines)
-{
-  std::string text;
-  for (const std::string& line : lines)
-  {
-    text += (text.empty() ? "" : "; ") + line;
-  }
-  return text;
 }
 
 std::vector<HandEyeResidual> residualsOf(const Problem& problem, const State& state, const Indices& used)
@@ -97,7 +87,7 @@ HandEyeResult calibrateHandEye(const HandEyeView& view, const std::vector<HandEy
   result.missing = missingMotion(result.motion, params);
   if (!result.missing.empty())
   {
-    result.message = "too little motion: " + joined(result.missing);
+    result.message = "too little motion: " + join(result.missing, "; ");
     return result;
   }
 
@@ -151,7 +141,7 @@ HandEyeResult calibrateHandEye(const HandEyeView& view, const std::vector<HandEy
   result.missing = missingMotion(result.motion, params);
   if (!result.missing.empty())
   {
-    result.message = "too little motion, without the poses that disagree: " + joined(result.missing);
+    result.message = "too little motion, without the poses that disagree: " + join(result.missing, "; ");
     return result;
   }
   if (!(result.translationSigma() <= params.max_translation_sigma) ||

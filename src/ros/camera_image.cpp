@@ -4,6 +4,7 @@
 
 #include "view_servo/images/image_io.h"
 #include "view_servo/parameters/error_text.h"
+#include "view_servo/parameters/join.h"
 #include "view_servo/ros/conversions.h"
 #include "view_servo/ros/node_base.h"
 
@@ -100,12 +101,7 @@ void CameraImageSubscriber::subscribe(const ros::NodeHandle& nh, const ros::Node
       names.push_back(COMPRESSED);
     }
     std::sort(names.begin(), names.end());
-    std::string list;
-    for (const std::string& name : names)
-    {
-      list += (list.empty() ? "" : ", ") + name;
-    }
-    throw std::invalid_argument("image_transport: '" + wanted + "' is not installed; there are: " + list);
+    throw std::invalid_argument("image_transport: '" + wanted + "' is not installed; there are: " + join(names, ", "));
   }
   topic_ = nh.resolveName(topic) + "/" + COMPRESSED;
   const boost::function<void(const sensor_msgs::CompressedImageConstPtr&)> on_image =

@@ -2,6 +2,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "view_servo/ros/parameters.h"
 
+#include "view_servo/parameters/join.h"
+
 #include <ros/console.h>
 #include <ros/param.h>
 
@@ -45,16 +47,6 @@ std::optional<std::string> toText(XmlRpc::XmlRpcValue value, const std::string& 
     default:
       return std::nullopt;
   }
-}
-
-std::string join(const std::vector<std::string>& words, const std::string& separator)
-{
-  std::string text;
-  for (const std::string& word : words)
-  {
-    text += (text.empty() ? "" : separator) + word;
-  }
-  return text;
 }
 
 /** "a/b" of "a/b/c"; empty for a name without any. */
