@@ -5,6 +5,7 @@
 #include "view_servo/Homography.h"
 #include "view_servo/SetView.h"
 #include "view_servo/control/travelled_way.h"
+#include "view_servo/parameters/seconds_since.h"
 #include "view_servo/ros/camera_input.h"
 #include "view_servo/ros/conversions.h"
 #include "view_servo/ros/marker_output.h"
@@ -371,7 +372,7 @@ private:
     publish(task, track, header, news);
     draw(task, header, camera_in_odom);
     const std::lock_guard<std::mutex> lock(mutex_);
-    timings_.add(1e3 * std::chrono::duration<double>(Clock::now() - begin_time).count());
+    timings_.add(1e3 * secondsSince(begin_time));
   }
 
   /**

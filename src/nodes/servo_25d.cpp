@@ -9,6 +9,7 @@
 #include "view_servo/control/servo_25d.h"
 #include "view_servo/parameters/error_text.h"
 #include "view_servo/parameters/numbers.h"
+#include "view_servo/parameters/seconds_since.h"
 #include "view_servo/ros/arm_conversions.h"
 #include "view_servo/ros/conversions.h"
 #include "view_servo/ros/driver_node.h"
@@ -373,7 +374,7 @@ private:
       return toProgress(task_->servo().report());
     }
     const std::string acquiring = answer_.came() ? task_->acquiring : answer_.missing();
-    const bool late = std::chrono::duration<double>(Clock::now() - task_->start).count() > params_.acquire_timeout;
+    const bool late = secondsSince(task_->start) > params_.acquire_timeout;
     return late ? Progress{ Progress::FAILED,
                             "the view is not found within " + seconds(params_.acquire_timeout) + ": " + acquiring }
                 : Progress{ Progress::ACQUIRING, acquiring };

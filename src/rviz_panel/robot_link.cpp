@@ -9,6 +9,7 @@
 #include "view_servo/ServoToViewAction.h"
 #include "view_servo/images/image_io.h"
 #include "view_servo/parameters/error_text.h"
+#include "view_servo/parameters/seconds_since.h"
 #include "view_servo/ros/camera_image.h"
 #include "view_servo/ros/conversions.h"
 

@@ -34,12 +34,6 @@ struct ListedView
   std::string fault;   ///< why it cannot be read; or empty
 };
 
-/** Time since `time` [s]. */
-inline double secondsSince(std::chrono::steady_clock::time_point time)
-{
-  return std::chrono::duration<double>(std::chrono::steady_clock::now() - time).count();
-}
-
 /** The newest picture of a topic. */
 struct TopicPicture
 {

@@ -7,6 +7,7 @@
 #include "rviz_panel/robot_light.h"
 #include "tools/region_judgement.h"
 #include "view_servo/parameters/error_text.h"
+#include "view_servo/parameters/seconds_since.h"
 
 #include <ros/time.h>
 #include <QtCore/QSignalBlocker>

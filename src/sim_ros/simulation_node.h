@@ -9,6 +9,7 @@
 #include "sim_ros/simulation_params.h"
 #include "view_servo/SetLight.h"
 #include "view_servo/SetPose.h"
+#include "view_servo/parameters/seconds_since.h"
 #include "view_servo/ros/conversions.h"
 #include "view_servo/ros/node_base.h"
 #include "view_servo/ros/parameters.h"
@@ -121,24 +122,18 @@ private:
   /** How long a command holds [s]. With a cycle of control and the time to brake the robot stands within 0.25 s. */
   static constexpr double COMMAND_TIMEOUT = 0.2;
 
-  /** Time from `then` to now [s]. */
-  static double since(Clock::time_point then)
-  {
-    return std::chrono::duration<double>(Clock::now() - then).count();
-  }
-
   /** Simulates the robot up to the present time. The caller holds the robot's mutex. */
   void advance()
   {
     constexpr double MAX_STEP = 0.005;  // [s]
-    if (commanded_ && since(last_command_) > COMMAND_TIMEOUT)
+    if (commanded_ && secondsSince(last_command_) > COMMAND_TIMEOUT)
     {
       robot_->halt();
       commanded_ = false;
       ROS_WARN_STREAM_THROTTLE(10.0, "no command on " << command_subscriber_.getTopic() << " for " << COMMAND_TIMEOUT
                                                       << " s: the robot stands");
     }
-    const double elapsed = since(last_step_);
+    const double elapsed = secondsSince(last_step_);
     last_step_ = Clock::now();
     const int steps = static_cast<int>(std::ceil(elapsed / MAX_STEP));
     for (int i = 0; i < steps; ++i)

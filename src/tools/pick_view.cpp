@@ -5,6 +5,7 @@
 #include "tools/region_picker.h"
 #include "view_servo/SaveView.h"
 #include "view_servo/parameters/error_text.h"
+#include "view_servo/parameters/seconds_since.h"
 #include "view_servo/ros/call_service.h"
 #include "view_servo/ros/conversions.h"
 
@@ -58,11 +59,6 @@ class Problem : public std::runtime_error
 {
   using std::runtime_error::runtime_error;
 };
-
-double secondsSince(Clock::time_point time)
-{
-  return std::chrono::duration<double>(Clock::now() - time).count();
-}
 
 /**
  * Libraries of windows end the whole process when there is no display, so another process tries.

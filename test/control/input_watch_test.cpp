@@ -2,6 +2,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "view_servo/control/input_watch.h"
 
+#include "view_servo/parameters/seconds_since.h"
+
 #include <gtest/gtest.h>
 
 #include <chrono>
@@ -13,17 +15,12 @@ namespace
 {
 using Clock = InputWatch::Clock;
 
-double since(Clock::time_point start)
-{
-  return std::chrono::duration<double>(Clock::now() - start).count();
-}
-
 /** Whether a watch becomes stale; gives up long after it should have. */
 bool becomesStale(const InputWatch& watch)
 {
   constexpr double DEADLINE = 20.0;  // [s]
   const Clock::time_point start = Clock::now();
-  while (!watch.stale() && since(start) < watch.timeout() + DEADLINE)
+  while (!watch.stale() && secondsSince(start) < watch.timeout() + DEADLINE)
   {
   }
   return watch.stale();
@@ -45,7 +42,7 @@ TEST(InputWatch, BecomesStaleAfterItsTimeout)
   const Clock::time_point before = Clock::now();
   const InputWatch watch(0.02);
   EXPECT_TRUE(becomesStale(watch));
-  EXPECT_GT(since(before), 0.02);  // not before it is over
+  EXPECT_GT(secondsSince(before), 0.02);  // not before it is over
   EXPECT_GT(watch.age(), 0.02);
 }
 
@@ -56,15 +53,15 @@ TEST(InputWatch, AgeIsTheTimeSinceItWasFed)
   const Clock::time_point after = Clock::now();
   ASSERT_TRUE(becomesStale(watch));
   EXPECT_GE(watch.age(), 0.02);
-  const double shortest = since(after);
+  const double shortest = secondsSince(after);
   const double age = watch.age();
   EXPECT_GE(age, shortest);
-  EXPECT_LE(age, since(before));
+  EXPECT_LE(age, secondsSince(before));
   // Fed, it is no older than the moment before.
   const Clock::time_point fed = Clock::now();
   watch.restart();
   const double new_age = watch.age();
-  EXPECT_LE(new_age, since(fed));
+  EXPECT_LE(new_age, secondsSince(fed));
 }
 
 TEST(InputWatch, FreshInputMakesItGoodAgain)
@@ -79,7 +76,7 @@ TEST(InputWatch, FreshInputMakesItGoodAgain)
     const Clock::time_point fed = Clock::now();
     watch.restart();
     const bool stale = watch.stale();
-    looked_in_time = since(fed) < TIMEOUT;
+    looked_in_time = secondsSince(fed) < TIMEOUT;
     EXPECT_FALSE(looked_in_time && stale);
   }
   EXPECT_TRUE(looked_in_time);

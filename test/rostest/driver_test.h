@@ -9,6 +9,7 @@
 
 #include "view_servo/ServoStatus.h"
 #include "view_servo/WantedView.h"
+#include "view_servo/parameters/seconds_since.h"
 
 #include <actionlib/client/simple_action_client.h>
 #include <gtest/gtest.h>
@@ -335,7 +336,7 @@ protected:
     const Clock::time_point moment = Clock::now();
     cause();
     EXPECT_TRUE(waitUntil([this] { return client_.getState().isDone(); })) << reason();
-    EXPECT_LT(std::chrono::duration<double>(Clock::now() - moment).count(), within);
+    EXPECT_LT(secondsSince(moment), within);
     expectToFail(words);
     EXPECT_EQ(client_.getState().state_, state);
     EXPECT_LT(commands_.lastMotionAfter(moment), STOPS_WITHIN);
@@ -372,9 +373,9 @@ protected:
       const Clock::time_point moment = Clock::now();
       cause();
       EXPECT_TRUE(waitUntil([this] { return client.getState().isDone(); })) << node.output();
-      EXPECT_LT(std::chrono::duration<double>(Clock::now() - moment).count(), ENDS_WITHIN);
+      EXPECT_LT(secondsSince(moment), ENDS_WITHIN);
       EXPECT_EQ(node.exitStatus(), 0) << node.output();
-      EXPECT_LT(std::chrono::duration<double>(Clock::now() - moment).count(), 2.0 * SLOWDOWN);
+      EXPECT_LT(secondsSince(moment), 2.0 * SLOWDOWN);
       EXPECT_FALSE(commands.moving());
       EXPECT_LT(commands.lastMotionAfter(moment), STOPS_WITHIN);
       EXPECT_EQ(client.getState().getText(), "the node is shutting down");

@@ -5,6 +5,7 @@
 #include "node_test.h"
 
 #include "view_servo/HomeToViewAction.h"
+#include "view_servo/parameters/seconds_since.h"
 #include "view_servo/ros/driver_node.h"
 #include "view_servo/ros/driver_params.h"
 
@@ -169,7 +170,7 @@ public:
     stage().zeros = velocity.isZero() ? stage().zeros + 1 : 0;
     if (!velocity.isZero())
     {
-      const double age = std::chrono::duration<double>(Clock::now() - stage().last_input).count();
+      const double age = secondsSince(stage().last_input);
       stage().require(stage().enabled, "no motion unless enabled");
       stage().require(stage().begun, "no motion without a goal that has begun");
       stage().require(age < STOPS_WITHIN, "no motion without fresh input");

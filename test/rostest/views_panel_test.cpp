@@ -8,6 +8,7 @@
 #include "rviz_panel/views_widget.h"
 #include "view_servo/ServoStatus.h"
 #include "view_servo/SetPose.h"
+#include "view_servo/parameters/seconds_since.h"
 #include "view_servo/ros/call_service.h"
 #include "view_servo/views/view_store.h"
 
@@ -39,11 +40,6 @@ namespace test
 namespace
 {
 using Clock = std::chrono::steady_clock;
-
-double secondsSince(Clock::time_point time)
-{
-  return std::chrono::duration<double>(Clock::now() - time).count();
-}
 
 class ViewsPanelTest : public ::testing::Test
 {

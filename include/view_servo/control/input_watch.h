@@ -2,6 +2,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include "view_servo/parameters/seconds_since.h"
+
 #include <atomic>
 #include <chrono>
 
@@ -31,7 +33,7 @@ public:
   /** Time since restart() was last called, or since this object was made [s]. */
   double age() const
   {
-    return std::chrono::duration<double>(Clock::now() - last_.load()).count();
+    return secondsSince(last_.load());
   }
 
   /** Whether age() exceeds the timeout. */

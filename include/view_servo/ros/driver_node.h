@@ -4,6 +4,7 @@
 
 #include "view_servo/control/goal_rules.h"
 #include "view_servo/parameters/error_text.h"
+#include "view_servo/parameters/seconds_since.h"
 #include "view_servo/ros/driver_context.h"
 #include "view_servo/ros/inbox.h"
 #include "view_servo/ros/live_parameters.h"
@@ -331,7 +332,7 @@ private:
     });
     result.success = success ? 1 : 0;
     result.message = reason;
-    result.duration = std::chrono::duration<double>(Clock::now() - goal.start).count();
+    result.duration = secondsSince(goal.start);
     driver_.end();
     publishWantedView(driver_.idleView(), "");
     status_.publish(status);
@@ -397,7 +398,7 @@ private:
     circumstances.enabled = gate_.open();
     circumstances.cancelled = goal_->cancelled;
     circumstances.has_listener = gate_.dryRun() || driver_.hasListener();
-    circumstances.elapsed = std::chrono::duration<double>(Clock::now() - goal_->start).count();
+    circumstances.elapsed = secondsSince(goal_->start);
     circumstances.timeout = goal_->timeout;
     circumstances.fault = jump;
     circumstances.patience = params_.patience();
@@ -410,7 +411,7 @@ private:
     else
     {
       missing_since_ = missing_since_.value_or(Clock::now());
-      circumstances.missing_for = std::chrono::duration<double>(Clock::now() - *missing_since_).count();
+      circumstances.missing_for = secondsSince(*missing_since_);
     }
     const Progress progress = runs ? driver_.progress() : Progress{ Progress::PREPARING, waiting_for_ };
     const Verdict verdict = judge(circumstances, progress);
