@@ -44,6 +44,56 @@ std::vector<HandEyeResidual> residualsOf(const Problem& problem, const State& st
   return residuals;
 }
 
+/** The poses that agree with a start, which most of them suit, to begin the refinement with. */
+Indices agreeingWithStart(const Problem& problem, const State& start)
+{
+  constexpr double CLEARLY = 3.0;     // times the typical error, beyond which a pose is left out
+  constexpr double CONSISTENT = 1.5;  // a normal distribution's standard deviation over its median error, about
+  constexpr double LEAST = 0.1;       // errors that are none at the start [px]
+  std::vector<double> errors;
+  for (std::size_t i = 0; i < problem.size(); ++i)
+  {
+    errors.push_back(std::sqrt(problem.squaredError(start, i)));
+  }
+  const double limit = CLEARLY * std::max(CONSISTENT * medianOf(errors), LEAST);
+  Indices agreeing;
+  for (std::size_t i = 0; i < errors.size(); ++i)
+  {
+    if (errors[i] <= limit)
+    {
+      agreeing.push_back(i);
+    }
+  }
+  return agreeing;
+}
+
+/** Fills in what was estimated, and how uncertain that is. */
+void fillEstimate(const State& state, const ErrorModel& model, double arm_lever, HandEyeResult& result)
+{
+  result.camera_in_flange = state.camera_in_flange;
+  result.view_in_base = state.view_in_base;
+  result.normal = state.normal;
+  result.distance = state.distance;
+  const Eigen::MatrixXd covariance = model.variance * model.inverse;
+  result.covariance = covariance.topLeftCorner<6, 6>();
+  result.distance_sigma = state.distance * std::sqrt(covariance(14, 14));
+  result.image_error = std::sqrt(model.variance);
+  result.rotation_error = model.ratio * result.image_error;
+  result.translation_error = arm_lever * result.rotation_error;
+}
+
+/** How far the poses that were used are from one another. */
+HandEyeMotion motionOfUsed(const HandEyeView& view, const std::vector<HandEyePose>& poses, const Indices& used,
+                           const Eigen::Vector3d& normal)
+{
+  std::vector<HandEyePose> chosen;
+  for (const std::size_t i : used)
+  {
+    chosen.push_back(poses[i]);
+  }
+  return motionOf(Problem(view, chosen, NONE), chosen, normal);
+}
+
 /** What makes a result more certain. */
 std::string remedyFor(const HandEyeResult& result)
 {
@@ -71,10 +121,7 @@ double HandEyeResult::rotationSigma() const
 HandEyeResult calibrateHandEye(const HandEyeView& view, const std::vector<HandEyePose>& poses,
                                const HandEyeParams& params)
 {
-  constexpr double PART = 0.6;        // of the poses, which the start has to suit
-  constexpr double CLEARLY = 3.0;     // times the typical error, beyond which a pose is left out at the start
-  constexpr double CONSISTENT = 1.5;  // a normal distribution's standard deviation over its median error, about
-  constexpr double LEAST = 0.1;       // errors that are none at the start [px]
+  constexpr double PART = 0.6;  // of the poses, which the start has to suit
   check(view, poses);
   if (!std::isnan(params.distance) && !(params.distance > 0.0 && std::isfinite(params.distance)))
   {
@@ -100,20 +147,7 @@ HandEyeResult calibrateHandEye(const HandEyeView& view, const std::vector<HandEy
         "frames are right";
     return result;
   }
-  std::vector<double> errors;
-  for (std::size_t i = 0; i < poses.size(); ++i)
-  {
-    errors.push_back(std::sqrt(problem.squaredError(state, i)));
-  }
-  const double limit = CLEARLY * std::max(CONSISTENT * medianOf(errors), LEAST);
-  Indices used;
-  for (std::size_t i = 0; i < poses.size(); ++i)
-  {
-    if (errors[i] <= limit)
-    {
-      used.push_back(i);
-    }
-  }
+  Indices used = agreeingWithStart(problem, state);
   ErrorModel model;
   result.message = refine(problem, params.arm_lever, state, used, model);
   result.residuals = residualsOf(problem, state, used);
@@ -122,22 +156,8 @@ HandEyeResult calibrateHandEye(const HandEyeView& view, const std::vector<HandEy
     return result;
   }
 
-  std::vector<HandEyePose> agreeing;
-  for (const std::size_t i : used)
-  {
-    agreeing.push_back(poses[i]);
-  }
-  result.camera_in_flange = state.camera_in_flange;
-  result.view_in_base = state.view_in_base;
-  result.normal = state.normal;
-  result.distance = state.distance;
-  const Eigen::MatrixXd covariance = model.variance * model.inverse;
-  result.covariance = covariance.topLeftCorner<6, 6>();
-  result.distance_sigma = state.distance * std::sqrt(covariance(14, 14));
-  result.image_error = std::sqrt(model.variance);
-  result.rotation_error = model.ratio * result.image_error;
-  result.translation_error = params.arm_lever * result.rotation_error;
-  result.motion = motionOf(Problem(view, agreeing, NONE), agreeing, state.normal);
+  fillEstimate(state, model, params.arm_lever, result);
+  result.motion = motionOfUsed(view, poses, used, state.normal);
   result.missing = missingMotion(result.motion, params);
   if (!result.missing.empty())
   {
