@@ -315,94 +315,117 @@ Segments detectByEdLines(const cv::Mat& image)
   return segments;
 }
 
-int runTime(const std::filesystem::path& data, LineMatcherParams params, int runs)
+constexpr std::size_t MOST_SEGMENTS = 300;  // in an image whose time is taken
+
+Segments longest(Segments segments)
 {
-  static constexpr std::size_t MAX_SEGMENTS = 300;
-  params.segments.max_segments = MAX_SEGMENTS;
-  const LineViewMatcher matcher(params);
-  const auto longest = [](Segments segments) {
-    std::stable_sort(segments.begin(), segments.end(),
-                     [](const Segment& a, const Segment& b) { return a.length() > b.length(); });
-    segments.resize(std::min(segments.size(), MAX_SEGMENTS));
-    return segments;
-  };
+  std::stable_sort(segments.begin(), segments.end(),
+                   [](const Segment& a, const Segment& b) { return a.length() > b.length(); });
+  segments.resize(std::min(segments.size(), MOST_SEGMENTS));
+  return segments;
+}
+
+std::shared_ptr<LineFeatures> indexedFeatures(const cv::Mat& image, const LineMatcherParams& params)
+{
+  auto result = std::make_shared<LineFeatures>(image, detectLineSegments(image, params.segments), params.features);
+  result->index(LineGrouping::TRIPLETS);
+  return result;
+}
+
+/** Ours first. @param matcher has to outlive them. @param reference is set to ours; likewise. */
+std::vector<Timing> waysToTime(const LineViewMatcher& matcher, std::shared_ptr<LineFeatures>& reference)
+{
   LineSegmentParams lsd;
   lsd.detector = SegmentDetector::LSD;
-  lsd.max_segments = MAX_SEGMENTS;
-  const auto prepared = [&params](const cv::Mat& image) {
-    auto features = std::make_shared<LineFeatures>(image, detectLineSegments(image, params.segments), params.features);
-    features->index(LineGrouping::TRIPLETS);
-    return features;
+  lsd.max_segments = MOST_SEGMENTS;
+  return {
+    { "view_servo",
+      [&matcher, &reference](const LinePair& of) { reference = indexedFeatures(of.reference, matcher.params()); },
+      [&matcher, &reference](const LinePair& of) {
+        matcher.match(*reference, *indexedFeatures(of.current, matcher.params()), GeometryModel::HOMOGRAPHY,
+                      LineGrouping::TRIPLETS);
+      } },
+    timingOfLbd("LSD+LBD", [lsd](const cv::Mat& image) { return longest(detectLineSegments(image, lsd)); }),
+    timingOfLbd("EDLines+LBD", [](const cv::Mat& image) { return longest(detectByEdLines(image)); }),
   };
+}
+
+/** Takes the times of some runs with a pair, in place of those that were taken before. */
+void takeTimes(const LinePair& pair, int runs, std::vector<Timing>& timings)
+{
+  for (Timing& timing : timings)
+  {
+    timing.fresh.clear();
+    timing.stored.clear();
+  }
+  for (int run = 0; run < runs + 1; ++run)  // the first warms up
+  {
+    for (Timing& timing : timings)
+    {
+      const double start = processorTime();
+      timing.prepare(pair);
+      const double stored = processorTime();
+      timing.match(pair);
+      const double end = processorTime();
+      if (run > 0)
+      {
+        timing.fresh.push_back(end - start);
+        timing.stored.push_back(end - stored);
+      }
+    }
+  }
+}
+
+/** One row of the table: of each way, its two numbers. */
+void printRow(const std::string& name, const std::string& segments, const std::vector<double>& numbers, int decimals)
+{
+  std::printf("%-20s %8s", name.c_str(), segments.c_str());
+  for (std::size_t i = 0; i < numbers.size(); ++i)
+  {
+    std::printf(" %*.*f", i % 2 == 0 ? 12 : 8, decimals, numbers[i]);
+  }
+  std::printf("\n");
+}
+
+int runTime(const std::filesystem::path& data, LineMatcherParams params, int runs)
+{
+  const cv::Size size(640, 480);
+  params.segments.max_segments = MOST_SEGMENTS;
+  const LineViewMatcher matcher(params);
   std::shared_ptr<LineFeatures> reference;
+  std::vector<Timing> timings = waysToTime(matcher, reference);
   for (const int threads : { 1, 2 })
   {
     cv::setNumThreads(threads);
     std::printf("640x480, threads: %d, processor time, medians of %d runs in ms\n%-20s %8s", threads, runs, "",
                 "segments");
-    std::vector<double> sums;
-    bool first = true;
-    for (LinePair pair : readBenchmarkPairs(data))
+    for (const Timing& timing : timings)
     {
-      const cv::Size size(640, 480);
-      cv::resize(pair.reference, pair.reference, size, 0.0, 0.0, cv::INTER_AREA);
-      cv::resize(pair.current, pair.current, size, 0.0, 0.0, cv::INTER_AREA);
-      std::vector<Timing> timings = {
-        { "view_servo", [&](const LinePair& of) { reference = prepared(of.reference); },
-          [&](const LinePair& of) {
-            matcher.match(*reference, *prepared(of.current), GeometryModel::HOMOGRAPHY, LineGrouping::TRIPLETS);
-          } },
-        timingOfLbd("LSD+LBD", [&](const cv::Mat& image) { return longest(detectLineSegments(image, lsd)); }),
-        timingOfLbd("EDLines+LBD", [&](const cv::Mat& image) { return longest(detectByEdLines(image)); }),
-      };
-      if (first)
-      {
-        for (const Timing& timing : timings)
-        {
-          std::printf(" %12s %8s", timing.name.c_str(), "stored");
-        }
-        std::printf("\n");
-        sums.assign(2 * timings.size(), 0.0);
-        first = false;
-      }
-      for (int run = 0; run < runs + 1; ++run)  // the first warms up
-      {
-        for (Timing& timing : timings)
-        {
-          const double start = processorTime();
-          timing.prepare(pair);
-          const double stored = processorTime();
-          timing.match(pair);
-          const double end = processorTime();
-          if (run > 0)
-          {
-            timing.fresh.push_back(end - start);
-            timing.stored.push_back(end - stored);
-          }
-        }
-      }
-      std::printf("%-20s %8zu", pair.name.c_str(), reference->segments().size());
-      for (std::size_t i = 0; i < timings.size(); ++i)
-      {
-        const double fresh = medianOf(timings[i].fresh);
-        const double stored = medianOf(timings[i].stored);
-        sums[2 * i] += fresh;
-        sums[2 * i + 1] += stored;
-        std::printf(" %12.1f %8.1f", fresh, stored);
-      }
-      std::printf("\n");
-    }
-    std::printf("%-20s %8s", "together", "");
-    for (std::size_t i = 0; i < sums.size(); ++i)
-    {
-      std::printf(i % 2 == 0 ? " %12.1f" : " %8.1f", sums[i]);
-    }
-    std::printf("\n%-20s %8s", "of LSD+LBD", "");
-    for (std::size_t i = 0; i < sums.size(); ++i)
-    {
-      std::printf(i % 2 == 0 ? " %12.2f" : " %8.2f", sums[i] / sums[2 + i % 2]);
+      std::printf(" %12s %8s", timing.name.c_str(), "stored");
     }
     std::printf("\n");
+    std::vector<double> sums(2 * timings.size(), 0.0);
+    for (LinePair pair : readBenchmarkPairs(data))
+    {
+      cv::resize(pair.reference, pair.reference, size, 0.0, 0.0, cv::INTER_AREA);
+      cv::resize(pair.current, pair.current, size, 0.0, 0.0, cv::INTER_AREA);
+      takeTimes(pair, runs, timings);
+      std::vector<double> medians;
+      for (const Timing& timing : timings)
+      {
+        medians.push_back(medianOf(timing.fresh));
+        medians.push_back(medianOf(timing.stored));
+      }
+      printRow(pair.name, std::to_string(reference->segments().size()), medians, 1);
+      std::transform(sums.begin(), sums.end(), medians.begin(), sums.begin(), std::plus<>());
+    }
+    printRow("together", "", sums, 1);
+    std::vector<double> ratios;
+    for (std::size_t i = 0; i < sums.size(); ++i)
+    {
+      ratios.push_back(sums[i] / sums[2 + i % 2]);
+    }
+    printRow("of LSD+LBD", "", ratios, 2);
   }
   return 0;
 }
