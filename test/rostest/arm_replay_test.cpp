@@ -21,9 +21,12 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <cstddef>
+#include <deque>
 #include <iterator>
 #include <map>
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -99,100 +102,119 @@ Twist relative(Twist twist)
   return twist;
 }
 
-TEST(ArmReplay, HomographiesAndTwistsAgreeWithTheTruth)
-{
-  constexpr double TOLERANCE = 2.0;       // of the region's corners [px]
-  constexpr double LEAST_SHARE = 0.95;    // of the homographies, and of the commands
-  constexpr double LEAST_ANSWERED = 0.6;  // of the images; a busy machine leaves some out
-  constexpr double FAR = 0.02;            // [m]
-  constexpr double LARGEST_ANGLE = 15.0;  // between twists [degrees]
-  constexpr double RAMP = 0.6;            // until a limited command has the direction of the one wanted [s]
+using Poses = std::map<ros::Time, Eigen::Isometry3d>;  // of the camera in the world, by the stamps of images
 
-  const TemporaryDirectory directory;
-  const std::string bag = directory.path() / "approach.bag";
-  const std::string file = worldFile("rice");
-  recordBag(file, "approach", bag, { "--rate", "30", "--urdf", PUMA_URDF_FILE });
-  ASSERT_FALSE(HasFatalFailure());
-  const sim::World world = sim::readWorld(file);
-  saveGoal("homography_tracker", world, world.goal, world.region);
-  std::map<ros::Time, Eigen::Isometry3d> poses;
+Poses posesOf(const std::string& bag)
+{
+  Poses poses;
   for (const Frame& frame : framesOf(bag))
   {
     poses[frame.stamp] = frame.pose;
   }
+  return poses;
+}
 
-  const Recorder<Homography> homographies("homography_tracker/homography");
-  const Recorder<geometry_msgs::TwistStamped> twists("cmd_vel_dry");
-  const Recorder<ServoError> errors("servo_error");
-  ASSERT_TRUE(waitForService("homography_tracker/start"));
-  ServoToViewGoal goal;
-  goal.view = "goal";
-  std::unique_ptr<actionlib::SimpleActionClient<ServoToViewAction>> client;
-  bool sent = false;
-  const auto send_goal = [&] {
-    if (!client && ros::Time::isValid())  // a client waits for that without end
+/** Sends the goal as soon as the camera is known. */
+class GoalSender
+{
+public:
+  /** Sends it unless it has been accepted; to be called again and again. */
+  void sendOnce()
+  {
+    if (!client_ && ros::Time::isValid())  // a client waits for that without end
     {
-      client = std::make_unique<actionlib::SimpleActionClient<ServoToViewAction>>("servo", false);
+      client_ = std::make_unique<actionlib::SimpleActionClient<ServoToViewAction>>("servo", false);
     }
-    if (!client || !client->isServerConnected())
+    if (!client_ || !client_->isServerConnected())
     {
       return;
     }
-    if (!sent || (client->getState().isDone() && client->getResult() && client->getResult()->iterations == 0))
+    if (!sent_ || (hasEnded() && client_->getResult() && client_->getResult()->iterations == 0))
     {
-      client->sendGoal(goal);  // as soon as the camera is known
-      sent = true;
+      ServoToViewGoal goal;
+      goal.view = "goal";
+      client_->sendGoal(goal);
+      sent_ = true;
     }
-  };
-  playBag(bag, 0.5, { "/camera/image_raw", "/camera/camera_info", "/tf", "/joint_states" }, send_goal);
-  ASSERT_FALSE(HasFatalFailure());
-  // The bag ends at the view.
-  ASSERT_TRUE(client && client->getState().isDone()) << errors.messages().size() << " errors";
-  EXPECT_TRUE(client->getResult()->success) << client->getResult()->message;
+  }
 
-  const TrueView truth(world);
-  std::size_t answered = 0;
-  std::size_t right = 0;
-  bool found = false;
-  ros::Time first;
-  for (const Homography& message : homographies.messages())
+  bool hasEnded() const
+  {
+    return client_ && client_->getState().isDone();
+  }
+  /** Of a goal that has ended. */
+  ServoToViewResult result() const
+  {
+    return *client_->getResult();
+  }
+
+private:
+  std::unique_ptr<actionlib::SimpleActionClient<ServoToViewAction>> client_;
+  bool sent_ = false;
+};
+
+constexpr double LEAST_SHARE = 0.95;  // of the homographies, and of the commands, that agree with the truth
+
+/** How many homographies agree with the truth. */
+struct JudgedHomographies
+{
+  std::optional<ros::Time> first;  // stamp of the first valid one
+  std::size_t answered = 0;        // all of images, from that one on
+  std::size_t right = 0;           // of these
+};
+
+JudgedHomographies judgeHomographies(const std::deque<Homography>& homographies, const Poses& poses,
+                                     const TrueView& truth)
+{
+  constexpr double TOLERANCE = 2.0;  // of the region's corners [px]
+  JudgedHomographies judged;
+  for (const Homography& message : homographies)
   {
     if (message.header.frame_id.empty())
     {
       continue;  // said without an image
     }
     const auto pose = poses.find(message.header.stamp);
-    ASSERT_NE(pose, poses.end()) << message.header.stamp;
-    if (!found && message.valid != 0)
+    if (pose == poses.end())
     {
-      found = true;
-      first = message.header.stamp;
+      ADD_FAILURE() << "no image has the stamp " << message.header.stamp;
+      continue;
     }
-    if (found)
+    if (!judged.first && message.valid != 0)
     {
-      ++answered;
-      right += message.valid != 0 && truth.cornerError(toMatrix(message.h), pose->second) < TOLERANCE ? 1 : 0;
+      judged.first = message.header.stamp;
+    }
+    if (judged.first)
+    {
+      ++judged.answered;
+      judged.right += message.valid != 0 && truth.cornerError(toMatrix(message.h), pose->second) < TOLERANCE ? 1 : 0;
     }
   }
-  ASSERT_TRUE(found);
-  // At the view the goal ends, and the tracker with it.
-  const ros::Time last = homographies.last()->header.stamp;
-  const auto images = static_cast<double>(std::distance(poses.lower_bound(first), poses.upper_bound(last)));
-  RecordProperty("homographies", static_cast<int>(answered));
-  RecordProperty("right", static_cast<int>(right));
-  EXPECT_GE(static_cast<double>(answered), LEAST_ANSWERED * images);
-  EXPECT_GE(static_cast<double>(right), LEAST_SHARE * static_cast<double>(answered)) << right << " of " << answered;
+  return judged;
+}
 
-  std::size_t far_commands = 0;
-  std::size_t agreeing = 0;
-  double largest = 0.0;
-  for (const geometry_msgs::TwistStamped& message : twists.messages())
+/** How many commands agree with those that the truth asks for. */
+struct JudgedCommands
+{
+  std::size_t far = 0;       // from the view
+  std::size_t agreeing = 0;  // of these
+  double largest = 0.0;      // angle between one of these and that of the truth [degrees]
+};
+
+/** @param begin commands before it are left out. */
+JudgedCommands judgeCommands(const std::deque<geometry_msgs::TwistStamped>& twists, const Poses& poses,
+                             const TrueView& truth, const Eigen::Isometry3d& goal, const ros::Time& begin)
+{
+  constexpr double FAR = 0.02;            // [m]
+  constexpr double LARGEST_ANGLE = 15.0;  // [degrees]
+  JudgedCommands judged;
+  for (const geometry_msgs::TwistStamped& message : twists)
   {
     Twist twist;
     twist << toVector(message.twist.linear), toVector(message.twist.angular);
     const auto pose = poses.lower_bound(message.header.stamp);
-    if (twist.isZero() || message.header.stamp < first + ros::Duration(RAMP) || pose == poses.end() ||
-        (pose->second.translation() - world.goal.translation()).norm() < FAR)
+    if (twist.isZero() || message.header.stamp < begin || pose == poses.end() ||
+        (pose->second.translation() - goal.translation()).norm() < FAR)
     {
       continue;
     }
@@ -202,15 +224,57 @@ TEST(ArmReplay, HomographiesAndTwistsAgreeWithTheTruth)
     const Twist expected = relative(servo.command(stamp));
     const double cosine = relative(twist).normalized().dot(expected.normalized());
     const double angle = std::acos(std::clamp(cosine, -1.0, 1.0)) * 180.0 / M_PI;
-    largest = std::max(largest, angle);
-    ++far_commands;
-    agreeing += angle < LARGEST_ANGLE ? 1 : 0;
+    judged.largest = std::max(judged.largest, angle);
+    ++judged.far;
+    judged.agreeing += angle < LARGEST_ANGLE ? 1 : 0;
   }
-  RecordProperty("far_commands", static_cast<int>(far_commands));
-  RecordProperty("largest_angle", static_cast<int>(largest));
-  EXPECT_GT(far_commands, 50u);
-  EXPECT_GE(static_cast<double>(agreeing), LEAST_SHARE * static_cast<double>(far_commands))
-      << agreeing << " of " << far_commands << ", the largest angle is " << largest;
+  return judged;
+}
+
+TEST(ArmReplay, HomographiesAndTwistsAgreeWithTheTruth)
+{
+  constexpr double LEAST_ANSWERED = 0.6;  // of the images; a busy machine leaves some out
+  constexpr double RAMP = 0.6;            // until a limited command has the direction of the one wanted [s]
+
+  const TemporaryDirectory directory;
+  const std::string bag = directory.path() / "approach.bag";
+  const std::string file = worldFile("rice");
+  recordBag(file, "approach", bag, { "--rate", "30", "--urdf", PUMA_URDF_FILE });
+  ASSERT_FALSE(HasFatalFailure());
+  const sim::World world = sim::readWorld(file);
+  saveGoal("homography_tracker", world, world.goal, world.region);
+  const Poses poses = posesOf(bag);
+
+  const Recorder<Homography> homographies("homography_tracker/homography");
+  const Recorder<geometry_msgs::TwistStamped> twists("cmd_vel_dry");
+  const Recorder<ServoError> errors("servo_error");
+  ASSERT_TRUE(waitForService("homography_tracker/start"));
+  GoalSender goal;
+  playBag(bag, 0.5, { "/camera/image_raw", "/camera/camera_info", "/tf", "/joint_states" }, [&] { goal.sendOnce(); });
+  ASSERT_FALSE(HasFatalFailure());
+  // The bag ends at the view.
+  ASSERT_TRUE(goal.hasEnded()) << errors.messages().size() << " errors";
+  EXPECT_TRUE(goal.result().success) << goal.result().message;
+
+  const TrueView truth(world);
+  const JudgedHomographies seen = judgeHomographies(homographies.messages(), poses, truth);
+  ASSERT_TRUE(seen.first);
+  // At the view the goal ends, and the tracker with it.
+  const ros::Time last = homographies.last()->header.stamp;
+  const auto images = static_cast<double>(std::distance(poses.lower_bound(*seen.first), poses.upper_bound(last)));
+  RecordProperty("homographies", static_cast<int>(seen.answered));
+  RecordProperty("right", static_cast<int>(seen.right));
+  EXPECT_GE(static_cast<double>(seen.answered), LEAST_ANSWERED * images);
+  EXPECT_GE(static_cast<double>(seen.right), LEAST_SHARE * static_cast<double>(seen.answered))
+      << seen.right << " of " << seen.answered;
+
+  const JudgedCommands commands =
+      judgeCommands(twists.messages(), poses, truth, world.goal, *seen.first + ros::Duration(RAMP));
+  RecordProperty("far_commands", static_cast<int>(commands.far));
+  RecordProperty("largest_angle", static_cast<int>(commands.largest));
+  EXPECT_GT(commands.far, 50u);
+  EXPECT_GE(static_cast<double>(commands.agreeing), LEAST_SHARE * static_cast<double>(commands.far))
+      << commands.agreeing << " of " << commands.far << ", the largest angle is " << commands.largest;
 }
 
 }  // namespace
