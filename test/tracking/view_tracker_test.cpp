@@ -2,212 +2,26 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "view_servo/tracking/view_tracker.h"
 
-#include "sim/renderer.h"
-#include "sim/visibility.h"
-#include "sim/world_reader.h"
-#include "support/shipped_files.h"
 #include "support/textured_plane.h"
 #include "view_servo/parameters/numbers.h"
-#include "view_servo/robust/random.h"
+#include "view_tracker_test.h"
 
 #include <gtest/gtest.h>
 #include <opencv2/core.hpp>
-#include <opencv2/imgproc.hpp>
 
-#include <algorithm>
 #include <cmath>
 #include <cstdint>
 #include <limits>
-#include <map>
-#include <memory>
-#include <optional>
 #include <stdexcept>
 #include <string>
 #include <vector>
 
 namespace view_servo
 {
+namespace test
+{
 namespace
 {
-/** What a wrong prediction is off by. */
-const PlanarPose ODOMETRY_ERROR{ 0.02, -0.015, 0.01 };
-
-/**
- * The desk, stored at its goal. Matches are made by ray casting: the true depths of corners, 1 to 3 m away and not
- * tracked by what is tested.
- */
-class Desk
-{
-public:
-  Desk()
-    : world_(sim::readWorld(test::worldFile("desk"))),
-      mount_(world_.camera_on_base),
-      camera_(world_, {}, 1),
-      reference_(camera_.capture(cameraAt(base())))
-  {
-    std::vector<cv::Point2f> corners;
-    cv::goodFeaturesToTrack(reference_, corners, 250, 0.01, 8.0);
-    for (const cv::Point2f& corner : corners)
-    {
-      const Eigen::Vector2d pixel(corner.x, corner.y);
-      const Eigen::Vector3d ray = world_.camera.normalized(pixel).homogeneous().normalized();
-      const Eigen::Isometry3d camera = cameraAt(base());
-      const Eigen::Vector3d direction = camera.linear() * ray;
-      if (const auto distance = sim::firstHit(world_, camera.translation(), direction))
-      {
-        pixels_.push_back(pixel);
-        points_.emplace_back(camera.translation() + *distance * direction);
-      }
-    }
-  }
-
-  const sim::World& world() const
-  {
-    return world_;
-  }
-  const CameraMount& mount() const
-  {
-    return mount_;
-  }
-  const cv::Mat& reference() const
-  {
-    return reference_;
-  }
-
-  /** The base pose where the view was stored. */
-  PlanarPose base() const
-  {
-    return toPlanar(world_.goal);
-  }
-
-  /** Where most tests track from. */
-  PlanarPose nearIt() const
-  {
-    return baseBefore(0.25, 0.1, 0.03);
-  }
-
-  /** A base pose, as seen from the goal. */
-  PlanarPose baseBefore(double back, double left, double yaw) const
-  {
-    return compose(base(), { -back, left, yaw });
-  }
-
-  /** What the camera sees from there; the same each time. */
-  cv::Mat image(const PlanarPose& base_pose, const sim::Light& light = {})
-  {
-    const std::vector<double> key{ base_pose.x, base_pose.y, base_pose.yaw, light.gain, light.offset, light.gradient };
-    cv::Mat& image = images_[key];
-    if (image.empty())
-    {
-      camera_.setLight(light);
-      image = camera_.capture(cameraAt(base_pose));
-    }
-    return image;
-  }
-
-  /** The pose of the stored view's camera in the current one. */
-  PlanarPose truth(const PlanarPose& current) const
-  {
-    return mount_.ofCamera(compose(inverse(current), base()));
-  }
-
-  /** Level points of corners that are in sight; with noise in the current image, and unrelated ones besides. */
-  Correspondences matches(const PlanarPose& current, double noise_px, int random, Rng& rng) const
-  {
-    const Eigen::Isometry3d camera = cameraAt(current);
-    Correspondences result;
-    for (std::size_t i = 0; i < points_.size(); ++i)
-    {
-      Eigen::Vector2d pixel = world_.camera.project(camera.inverse() * points_[i]);
-      const Eigen::Vector3d back = camera.translation() - points_[i];
-      const auto hidden = sim::firstHit(world_, points_[i], back.normalized(), 0.01);
-      if (!inImage(pixel) || (hidden && *hidden < back.norm()))
-      {
-        continue;
-      }
-      pixel.x() += noise_px * gaussian(rng);
-      pixel.y() += noise_px * gaussian(rng);
-      result.push_back({ levelOf(pixels_[i]), levelOf(pixel) });
-    }
-    for (int i = 0; i < random; ++i)
-    {
-      const double u = uniform(rng, 0.0, 639.0);
-      result.push_back(
-          { levelOf(pixels_[static_cast<std::size_t>(i) % pixels_.size()]), levelOf({ u, uniform(rng, 0.0, 479.0) }) });
-    }
-    return result;
-  }
-
-  /** A tracker that knows the structure, from two views half a metre apart. */
-  ViewTracker tracker(const ViewTrackerParams& params = ViewTrackerParams()) const
-  {
-    ViewTracker result(reference_, world_.camera, mount_, params);
-    Rng rng(1);
-    const PlanarPose there = baseBefore(0.5, 0.2, 0.05);
-    EXPECT_TRUE(result.start(matches(there, 0.3, 0, rng), truth(there)));
-    return result;
-  }
-
-private:
-  Eigen::Isometry3d cameraAt(const PlanarPose& base_pose) const
-  {
-    return sim::planarPose(base_pose.x, base_pose.y, base_pose.yaw) * world_.camera_on_base;
-  }
-  bool inImage(const Eigen::Vector2d& pixel) const
-  {
-    return pixel.x() >= 0.0 && pixel.y() >= 0.0 && pixel.x() < world_.camera.width && pixel.y() < world_.camera.height;
-  }
-  Eigen::Vector2d levelOf(const Eigen::Vector2d& pixel) const
-  {
-    return mount_.level(world_.camera.normalized(pixel));
-  }
-
-  sim::World world_;
-  CameraMount mount_;
-  sim::SimulatedCamera camera_;
-  cv::Mat reference_;
-  Points pixels_;                        // of corners of the stored view
-  std::vector<Eigen::Vector3d> points_;  // in the world
-  std::map<std::vector<double>, cv::Mat> images_;
-};
-
-class ViewTrackerTest : public ::testing::Test
-{
-protected:
-  static void SetUpTestSuite()
-  {
-    desk_ = std::make_unique<Desk>();
-  }
-  static void TearDownTestSuite()
-  {
-    desk_.reset();
-  }
-  static Desk& desk()
-  {
-    return *desk_;
-  }
-
-  /** Found where it truly is, in metres and radians. */
-  static void expectFound(const ViewTracker::Result& result, const PlanarPose& truth, double distance, double angle)
-  {
-    ASSERT_TRUE(result.found) << result.supporting << " of " << result.looked_for;
-    EXPECT_LT(std::hypot(result.pose.x - truth.x, result.pose.y - truth.y), distance);
-    EXPECT_LT(std::abs(wrapAngle(result.pose.yaw - truth.yaw)), angle);
-    EXPECT_LE(result.supporting, result.looked_for);
-    EXPECT_LE(result.rms, ViewTrackerParams().max_residual);
-  }
-
-  static PlanarPose wrongly(const PlanarPose& truth)
-  {
-    return { truth.x + ODOMETRY_ERROR.x, truth.y + ODOMETRY_ERROR.y, truth.yaw + ODOMETRY_ERROR.yaw };
-  }
-
-private:
-  static std::unique_ptr<Desk> desk_;
-};
-
-std::unique_ptr<Desk> ViewTrackerTest::desk_;
-
 /** The image in front of which stripes hide a part from the left. */
 cv::Mat covered(const cv::Mat& image, double part)
 {
@@ -220,91 +34,6 @@ cv::Mat covered(const cv::Mat& image, double part)
     }
   }
   return result;
-}
-
-}  // namespace
-
-// ---- the structure
-
-TEST_F(ViewTrackerTest, StartsWithDepthsFromTwoViews)
-{
-  ViewTracker tracker(desk().reference(), desk().world().camera, desk().mount(), ViewTrackerParams());
-  EXPECT_FALSE(tracker.hasStructure());
-  Rng rng(2);
-  const PlanarPose there = desk().baseBefore(0.5, 0.2, 0.05);
-  ASSERT_TRUE(tracker.start(desk().matches(there, 0.3, 0, rng), desk().truth(there)));
-  EXPECT_TRUE(tracker.hasStructure());
-  EXPECT_TRUE(tracker.depthsKnown());
-  tracker.clear();
-  EXPECT_FALSE(tracker.hasStructure());
-}
-
-TEST_F(ViewTrackerTest, StartRefusesTooFewAndChangesNothing)
-{
-  ViewTracker tracker(desk().reference(), desk().world().camera, desk().mount(), ViewTrackerParams());
-  Rng rng(3);
-  const PlanarPose there = desk().baseBefore(0.5, 0.2, 0.05);
-  Correspondences few = desk().matches(there, 0.0, 0, rng);
-  ASSERT_GT(few.size(), 40U);
-  few.resize(static_cast<std::size_t>(ViewTrackerParams().min_supporting) - 1);
-  EXPECT_FALSE(tracker.start(few, desk().truth(there)));
-  EXPECT_FALSE(tracker.start({}, desk().truth(there)));
-  EXPECT_FALSE(tracker.hasStructure());
-  // Many, but all at the border, where there is no room for a patch.
-  Correspondences border;
-  for (int v = 10; v < 470; v += 10)
-  {
-    const Eigen::Vector2d point = desk().mount().level(desk().world().camera.normalized({ 3.0, v }));
-    border.push_back({ point, 1.2 * point });
-  }
-  EXPECT_FALSE(tracker.start(border, { 0.5, 0.0, 0.0 }));
-  EXPECT_FALSE(tracker.hasStructure());
-  // A structure that is there stays.
-  ViewTracker started = desk().tracker();
-  EXPECT_FALSE(started.start(few, desk().truth(there)));
-  const PlanarPose here = desk().nearIt();
-  EXPECT_TRUE(started.track(desk().image(here), desk().truth(here)).found);
-}
-
-TEST_F(ViewTrackerTest, AssumesDepthsWhereNothingTellsThem)
-{
-  ViewTracker tracker(desk().reference(), desk().world().camera, desk().mount(), ViewTrackerParams());
-  Rng rng(4);
-  const PlanarPose there = desk().baseBefore(0.01, 0.0, 0.01);
-  ASSERT_TRUE(tracker.start(desk().matches(there, 0.1, 0, rng), desk().truth(there)));
-  EXPECT_TRUE(tracker.hasStructure());
-  EXPECT_FALSE(tracker.depthsKnown());
-  // Near the view that does.
-  const auto result = tracker.track(desk().image(there), {});
-  expectFound(result, desk().truth(there), 0.01, 0.2 * DEGREE);
-}
-
-TEST_F(ViewTrackerTest, KeepsNoMoreLandmarksThanAsked)
-{
-  ViewTrackerParams params;
-  params.max_landmarks = 30;
-  const ViewTracker tracker = desk().tracker(params);
-  const PlanarPose here = desk().nearIt();
-  const auto result = tracker.track(desk().image(here), desk().truth(here));
-  EXPECT_LE(result.looked_for, 30);
-  EXPECT_GE(result.looked_for, 15);
-}
-
-TEST_F(ViewTrackerTest, MoreMatchesExtendIt)
-{
-  Rng rng(5);
-  const PlanarPose there = desk().baseBefore(0.5, 0.2, 0.05);
-  const Correspondences all = desk().matches(there, 0.3, 0, rng);
-  ViewTracker tracker(desk().reference(), desk().world().camera, desk().mount(), ViewTrackerParams());
-  ASSERT_TRUE(tracker.start(Correspondences(all.begin(), all.begin() + 25), desk().truth(there)));
-  const PlanarPose here = desk().nearIt();
-  const int before = tracker.track(desk().image(here), desk().truth(here)).looked_for;
-  tracker.extend(all, desk().truth(there));
-  const int after = tracker.track(desk().image(here), desk().truth(here)).looked_for;
-  EXPECT_GT(after, 2 * before);
-  // The same again adds nothing.
-  tracker.extend(all, desk().truth(there));
-  EXPECT_EQ(tracker.track(desk().image(here), desk().truth(here)).looked_for, after);
 }
 
 // ---- tracking
@@ -395,7 +124,7 @@ TEST_F(ViewTrackerTest, DoesNotMindNoise)
   const ViewTracker tracker = desk().tracker();
   const PlanarPose here = desk().nearIt();
   const PlanarPose truth = desk().truth(here);
-  const cv::Mat noisy = test::disturbed(desk().image(here), 1.0, 0.0, 5.0);
+  const cv::Mat noisy = disturbed(desk().image(here), 1.0, 0.0, 5.0);
   expectFound(tracker.track(noisy, wrongly(truth)), truth, 0.008, 0.15 * DEGREE);
 }
 
@@ -423,7 +152,7 @@ TEST_F(ViewTrackerTest, FindsNothingWhereNothingIs)
   EXPECT_FALSE(tracker.track(cv::Mat(image.size(), image.type(), cv::Scalar(255)), truth).found);
   for (std::uint64_t seed = 1; seed <= 2; ++seed)
   {
-    EXPECT_FALSE(tracker.track(test::texturedPicture(seed, image.size()), truth).found) << seed;
+    EXPECT_FALSE(tracker.track(texturedPicture(seed, image.size()), truth).found) << seed;
   }
   // The same world, seen to the other side.
   EXPECT_FALSE(tracker.track(desk().image(desk().baseBefore(0.25, 0.1, 1.5)), truth).found);
@@ -485,43 +214,6 @@ TEST_F(ViewTrackerTest, SameImageGivesTheSamePose)
   EXPECT_EQ(first.supporting, second.supporting);
 }
 
-// ---- by matches
-
-TEST_F(ViewTrackerTest, LocatesWithoutPrediction)
-{
-  const ViewTracker tracker = desk().tracker();
-  Rng rng(6);
-  for (const PlanarPose& here : { desk().baseBefore(0.9, -0.5, -0.15), desk().baseBefore(0.3, 0.2, 0.1), desk().base(),
-                                  desk().baseBefore(-0.4, 0.1, 0.0) })
-  {
-    const PlanarPose truth = desk().truth(here);
-    const Correspondences matches = desk().matches(here, 0.7, 60, rng);
-    const auto result = tracker.locate(matches);
-    expectFound(result, truth, 0.02, 0.3 * DEGREE);
-    EXPECT_GT(result.supporting, 40);
-  }
-}
-
-TEST_F(ViewTrackerTest, LocatesNothingByMatchesOfNothing)
-{
-  const ViewTracker tracker = desk().tracker();
-  EXPECT_FALSE(tracker.locate({}).found);
-  Rng rng(7);
-  for (int trial = 0; trial < 5; ++trial)
-  {
-    Correspondences random = desk().matches(desk().base(), 0.0, 150, rng);
-    random.erase(random.begin(), random.end() - 150);
-    EXPECT_FALSE(tracker.locate(random).found) << trial;
-  }
-  // Of points that are no landmarks.
-  Correspondences elsewhere = desk().matches(desk().baseBefore(0.2, 0.0, 0.0), 0.0, 0, rng);
-  for (Correspondence& match : elsewhere)
-  {
-    match.reference.x() += 0.5;
-  }
-  EXPECT_FALSE(tracker.locate(elsewhere).found);
-}
-
 // ---- parameters
 
 TEST(ViewTrackerParams, NameAllFaultsAtOnce)
@@ -552,4 +244,6 @@ TEST(ViewTrackerParams, NameAllFaultsAtOnce)
   }
 }
 
+}  // namespace
+}  // namespace test
 }  // namespace view_servo
