@@ -12,7 +12,7 @@ namespace view_servo
 {
 using Worlds = std::map<std::string, sim::World>;  ///< by their names
 
-/** One of the worlds in this package's `config/worlds/`, by its name. @throws as sim::findWorld() and packageFolder(). */
+/** A world of this package's `config/worlds/`, by its name. @throws as sim::findWorld() and packageFolder() do. */
 sim::World readShippedWorld(const std::string& name);
 
 /** Several of them. */
