@@ -16,10 +16,10 @@ namespace
 std::vector<Parameter> rowsOfHomingDriver(HomingDriverParams& params)
 {
   return {
-    viewParameter(
-        params.view,
-        "stored view whose direction is estimated whenever no goal is active, and which a goal without a name means; "
-        "empty: none"),
+    viewParameter(params.view,
+                  "stored view whose direction is estimated whenever no goal is active, and to which the base drives "
+                  "when a goal's "
+                  "view is empty; empty: nothing is estimated, and such a goal is refused"),
     viewsDirParameter(params.views_dir),
     text("base_frame", params.base_frame,
          "the base's frame: that of commands, and the child frame of odometry; tf must know where the camera is in it"),

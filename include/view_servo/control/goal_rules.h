@@ -35,7 +35,7 @@ struct Circumstances
   bool cancelled = false;      ///< somebody has cancelled the goal
   bool has_listener = true;    ///< somebody listens to the commands, or nobody needs to
   double elapsed = 0.0;        ///< since the goal was accepted [s]
-  double timeout = 0.0;        ///< time limit of the goal [s]
+  double timeout = 0.0;        ///< the goal ends once `elapsed` exceeds it [s]; 0 is not "no limit"
   std::string fault;  ///< why the driver's state cannot be trusted any more: time went back, an exception; empty: none
   std::string missing_input;  ///< which input does not come, and since when; empty: all come
   double missing_for = 0.0;   ///< since a cycle first found an input missing [s]; 0 while all come

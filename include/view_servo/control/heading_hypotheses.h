@@ -72,7 +72,12 @@ public:
   /** @param focal_length of the level camera [px]. The parameters must be valid. */
   HeadingHypotheses(const HeadingHypothesesParams& params, double focal_length);
 
-  /** @param matches level points of an image. @param camera_in_odom pose of the level camera at its time. */
+  /**
+   * Takes in the matches of one image: updates all hypotheses, and adds one for each new motion. Without matches the
+   * hypotheses only lose weight and follow odometry.
+   * @param matches level points (see CameraMount) in the stored view and in the image.
+   * @param camera_in_odom pose of the level camera in odometry's frame when the image was taken.
+   */
   void update(const Correspondences& matches, const PlanarPose& camera_in_odom);
 
   /** Most weight first. */

@@ -84,7 +84,10 @@ struct HomingReport
   std::string reason;     ///< why it is in this state, in one line
   std::string manoeuvre;  ///< what a base that cannot slide does at the moment; empty: nothing worth a word
   bool at_view = false;   ///< the base is within arrival_distance and arrival_yaw, and the image looks like the view
-  /** Direction to the view's base pose in base_link, positive to the left [rad]. */
+  /**
+   * Direction in base_link to the base's position at the view: 0 = straight ahead, positive to the left [rad],
+   * (-pi, pi]. Mode SERVO: predicted by odometry while the view is not found.
+   */
   double heading = std::numeric_limits<double>::quiet_NaN();
   double yaw_error = std::numeric_limits<double>::quiet_NaN();  ///< angle still to be turned, counter-clockwise [rad]
   double distance = std::numeric_limits<double>::quiet_NaN();   ///< distance left to drive [m]
@@ -167,7 +170,10 @@ public:
   /** Where to go by all that has been added; STAND while that is not known. */
   virtual Course course() const = 0;
 
-  /** What the base should do now, by the newest odometry, before limits. */
+  /**
+   * Velocity that the base should have now, in base_link: course() applied to the newest odometry, not limited yet. Zero
+   * before the first odometry, and for STAND.
+   */
   BaseVelocity command() const
   {
     const std::optional<PlanarPose> base = odometry_.newest();

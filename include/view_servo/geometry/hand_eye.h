@@ -57,16 +57,18 @@ struct HandEyeMotion
   double travel = 0.0;           ///< largest way of the camera between two poses, as a part of the plane's distance
 };
 
-/** How well a pose fits the result. */
+/** How well a pose fits the result. Not `used`, and all 0, when no calibration was computed. */
 struct HandEyeResidual
 {
   bool used = false;         ///< false: the pose disagrees with the others, and was left out
   double pixels = 0.0;       ///< root mean square distance of the view's corners from where they should be [px]
-  double translation = 0.0;  ///< distance between the camera by the arm and by the image [m]
-  double rotation = 0.0;     ///< angle between the camera's orientation by the arm and by the image [rad]
+  double translation = 0.0;  ///< distance between the camera's positions that the arm and the homography give [m]
+  double rotation = 0.0;     ///< angle between the camera's orientations that these give [rad]
 };
 
-/** What calibrateHandEye() finds. All but `residuals` and `motion` is without meaning unless `found`. */
+/**
+ * What calibrateHandEye() finds. Unless `found`, only `message`, `missing`, `residuals` and `motion` have a meaning.
+ */
 struct HandEyeResult
 {
   bool found = false;

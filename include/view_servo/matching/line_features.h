@@ -102,7 +102,10 @@ public:
   {
     return meetings_[static_cast<std::size_t>(i)];
   }
-  /** The groups of the grouped segments; computed when first asked for. */
+  /**
+   * The pairs or triplets formed by the first groupedCount() segments, sorted by key, for associateLines();
+   * params.groups.groups is not used. Computed when first asked for.
+   */
   const LineIndex& index(LineGrouping groups) const;
 
   /**

@@ -77,7 +77,8 @@ public:
   ImageSourceReader(const ImageSourceParams& params, const CameraInput& camera);
 
   /**
-   * The image that a source names.
+   * Reads the image that a source names. CAMERA: blocks for up to image_patience until there is a usable image, as
+   * CameraInput::latest(patience) does; another thread has to receive images.
    * @param kind what kindOf() returns for the source. @param name as in kindOf().
    * @throws ImageError or ViewStoreError, naming what is wrong in one line.
    */

@@ -56,7 +56,8 @@ public:
   /**
    * @param grey 8-bit, one channel; the data is shared and must not be changed afterwards.
    * @param region where features are looked for [px]; empty = everywhere.
-   * @throws std::invalid_argument when the image has the wrong type or the region leaves it.
+   * @param params must be valid; this is not checked here.
+   * @throws std::invalid_argument when the image is empty or has the wrong type, or when the region leaves it.
    */
   PreparedImage(cv::Mat grey, const cv::Rect& region, const FeatureParams& params);
 
@@ -64,7 +65,7 @@ public:
   {
     return grey_;
   }
-  /** As given to the constructor; empty: everywhere. */
+  /** As given to the constructor; the whole image when that was empty. */
   const cv::Rect& region() const
   {
     return region_;
