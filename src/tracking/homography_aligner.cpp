@@ -84,7 +84,7 @@ cv::Rect checkedRegion(const cv::Mat& reference, const cv::Rect& region, const H
 }
 
 /** The corners of a region [px], strongest first. @throws std::invalid_argument when they are too few. */
-Points cornersOf(const cv::Mat& reference, const cv::Rect& region, const HomographyAlignerParams& params)
+Points findCorners(const cv::Mat& reference, const cv::Rect& region, const HomographyAlignerParams& params)
 {
   constexpr double SPREAD = 0.5;  // of the distance that corners on a grid would have
   cv::Mat mask(reference.size(), CV_8UC1, cv::Scalar(0));
@@ -162,7 +162,7 @@ public:
   Impl(const cv::Mat& reference, const cv::Rect& region, const HomographyAlignerParams& params)
     : params_(params),
       region_(checkedRegion(reference, region, params)),
-      points_(cornersOf(reference, region_, params)),
+      points_(findCorners(reference, region_, params)),
       patches_(patchesOf(reference, points_, params)),
       refiner_(reference, region_, params.min_correlation)
   {

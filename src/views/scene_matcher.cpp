@@ -32,7 +32,7 @@ namespace
 {
 constexpr std::size_t MIN_MATCHES = 15;
 // Significance of a plane: wrong ones of pairs that show nothing in common had 6.7 at most.
-constexpr double BEYOND_DOUBT = 15.0;
+constexpr double PLANE_BEYOND_DOUBT = 15.0;
 constexpr double IN_ORDER = 0.75;      // part of the matches of a fundamental matrix, see keepsOrientation()
 constexpr double LEAST_CHANCE = 0.01;  // that a corner is found beside a plane
 constexpr double SEARCH_RADIUS = 4.0;  // around where a plane sends a corner [px]
@@ -262,7 +262,7 @@ private:
 
   static bool isBeyondDoubt(const Plane* plane)
   {
-    return plane != nullptr && plane->significance >= BEYOND_DOUBT;
+    return plane != nullptr && plane->significance >= PLANE_BEYOND_DOUBT;
   }
 
   /** Whether the fundamental matrix is one that chance does not explain, also without its best plane. */
