@@ -13,8 +13,10 @@
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
+#include <functional>
 #include <iterator>
 #include <limits>
+#include <utility>
 
 namespace view_servo
 {
@@ -40,27 +42,51 @@ Parallax::Parallax(const Eigen::Matrix3d& plane, const Correspondences& pairs, d
   }
 }
 
-double Parallax::significance(const Eigen::Matrix3d& f) const
+std::vector<std::size_t> Parallax::countAgreeing(const Eigen::Matrix3d& f) const
 {
-  double best = -std::numeric_limits<double>::infinity();
-  double tests = 0.0;
+  std::vector<std::size_t> counts;
   std::size_t agreeing = 0;
-  double chances = 0.0;
   std::size_t next = FIRST;
   for (std::size_t i = 0; i < off_plane_.size(); ++i)
   {
-    chances += off_plane_[i].chance;
     agreeing += sampsonError(f, off_plane_[i].pair) < threshold_ * threshold_ ? 1 : 0;
-    const std::size_t count = i + 1;
-    if (count < FEWEST || (count != next && count != off_plane_.size()))
+    if (i + 1 == next || i + 1 == off_plane_.size())
+    {
+      counts.push_back(agreeing);
+      next *= 2;
+    }
+  }
+  return counts;
+}
+
+double Parallax::significance(const Eigen::Matrix3d& f) const
+{
+  return significance(countAgreeing(f));
+}
+
+double Parallax::significance(const std::vector<std::size_t>& agreeing) const
+{
+  double best = -std::numeric_limits<double>::infinity();
+  double tests = 0.0;
+  double chances = 0.0;
+  std::size_t first = 0;
+  std::size_t next = FIRST;
+  for (const std::size_t agree : agreeing)
+  {
+    const std::size_t count = std::min(next, off_plane_.size());
+    for (; first < count; ++first)
+    {
+      chances += off_plane_[first].chance;
+    }
+    next *= 2;
+    if (count < FEWEST)
     {
       continue;
     }
-    next *= 2;
     tests += 1.0;
     const double n = static_cast<double>(count);
     const double epipoles = n * (n - 1.0) / 2.0;
-    const std::size_t others = agreeing - std::min(agreeing, SAMPLE);
+    const std::size_t others = agree - std::min(agree, SAMPLE);
     best = std::max(best, -logBinomialTail(count - SAMPLE, others, chances / n) - std::log10(epipoles));
   }
   return best - std::log10(std::max(1.0, tests));
@@ -78,6 +104,7 @@ std::optional<Eigen::Matrix3d> Parallax::findFundamental(int samples, Rng& rng) 
   };
   std::optional<Eigen::Matrix3d> best;
   double best_significance = -std::numeric_limits<double>::infinity();
+  std::vector<std::size_t> best_agreeing;
   for (int i = 0; i < samples; ++i)
   {
     // Two of three samples are of the more trustworthy pairs.
@@ -92,10 +119,17 @@ std::optional<Eigen::Matrix3d> Parallax::findFundamental(int samples, Rng& rng) 
     {
       continue;
     }
-    const double found = significance(f);
+    // One with which nowhere more pairs agree is no more significant.
+    std::vector<std::size_t> agreeing = countAgreeing(f);
+    if (best && std::equal(agreeing.begin(), agreeing.end(), best_agreeing.begin(), std::less_equal<>()))
+    {
+      continue;
+    }
+    const double found = significance(agreeing);
     if (found > best_significance)
     {
       best_significance = found;
+      best_agreeing = std::move(agreeing);
       best = f;
     }
   }

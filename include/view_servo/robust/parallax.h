@@ -7,6 +7,7 @@
 
 #include <Eigen/Core>
 
+#include <cstddef>
 #include <optional>
 #include <vector>
 
@@ -47,6 +48,10 @@ private:
     Correspondence pair;
     double chance;  ///< probability that a random direction of its parallax agrees with an epipole
   };
+
+  /** How many of the first 25 pairs, of the first 50 and so on, and of all agree. */
+  std::vector<std::size_t> countAgreeing(const Eigen::Matrix3d& f) const;
+  double significance(const std::vector<std::size_t>& agreeing) const;
 
   Eigen::Matrix3d plane_;
   double threshold_;
