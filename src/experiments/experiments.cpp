@@ -82,7 +82,7 @@ const std::vector<Experiment>& experiments()
     { "view_consistency", "tables 6.2 and 6.3: the view constraint before and within RANSAC", true,
       VIEW_CONSISTENCY_RUNS, runViewConsistencyExperiment },
     { "rooms", "fundamental matrices between real views of rooms and buildings, beside SIFT and AKAZE", true,
-      std::nullopt, runRoomsExperiment },
+      DRAWN_WALK_PAIRS, runRoomsExperiment },
     { "false_answers", "answers for pictures of different scenes, mirrored ones and walls that repeat", true,
       UNRELATED_PAIRS, runFalseAnswersExperiment },
     { "recognition", "which of many stored views an image shows, beside ORB words", true, UNKNOWN_PICTURES,

@@ -8,12 +8,15 @@
 #include "experiments/statistics.h"
 #include "view_servo/geometry/fundamental.h"
 #include "view_servo/images/image_io.h"
+#include "view_servo/parameters/numbers.h"
 #include "view_servo/robust/quantile.h"
+#include "view_servo/robust/random.h"
 #include "view_servo/views/line_view_matcher.h"
 #include "view_servo/views/point_view_matcher.h"
 #include "view_servo/views/prepared_image.h"
 #include "view_servo/views/scene_matcher.h"
 
+#include <Eigen/Geometry>
 #include <Eigen/LU>
 #include <opencv2/calib3d.hpp>
 #include <opencv2/core.hpp>
@@ -22,6 +25,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstddef>
 #include <ctime>
 #include <functional>
 #include <iostream>
@@ -29,6 +33,7 @@
 #include <map>
 #include <optional>
 #include <ostream>
+#include <set>
 #include <string>
 #include <utility>
 #include <vector>
@@ -72,6 +77,9 @@ struct WalkPair
   Eigen::Isometry3d current_from_reference;
   cv::Size size;
 
+  static constexpr int COLUMNS = 12;  ///< of the grid of points in matchesAt()
+  static constexpr int ROWS = 8;
+
   /** Whether a match may be of one point before both cameras. */
   bool agrees(const Correspondence& match) const
   {
@@ -94,11 +102,15 @@ struct WalkPair
     return depths.minCoeff() > 0.0;
   }
 
+  /** Share of the reference image's points at a depth that the current image shows. */
+  double overlapAt(double depth) const
+  {
+    return static_cast<double>(matchesAt({ depth }).size()) / (ROWS * COLUMNS);
+  }
+
   /** What both views show of points all over the reference image at these depths. */
   Correspondences matchesAt(const std::vector<double>& depths) const
   {
-    constexpr int COLUMNS = 12;
-    constexpr int ROWS = 8;
     const cv::Rect2d frame(0.0, 0.0, size.width, size.height);
     Correspondences matches;
     for (int i = 0; i < ROWS * COLUMNS; ++i)
@@ -153,26 +165,81 @@ Correspondences trueMatches(const WalkPair& walk, const std::vector<Answer>& ans
   return matches;
 }
 
+cv::Mat readWalkImage(const fs::path& data, const std::string& name)
+{
+  return readGreyImage((data / "hololens_indoor" / "images" / name).string());
+}
+
+Eigen::Isometry3d motionBetween(const IndoorWalk& walk, const std::string& reference, const std::string& current)
+{
+  return walk.poses.at(current).inverse() * walk.poses.at(reference);
+}
+
+RoomPair walkPair(const fs::path& data, const IndoorWalk& walk, const std::string& set, const std::string& reference,
+                  const std::string& current)
+{
+  RoomPair pair;
+  pair.set = set;
+  pair.name = fs::path(reference).stem().string() + "-" + fs::path(current).stem().string();
+  pair.reference = readWalkImage(data, reference);
+  pair.current = readWalkImage(data, current);
+  const WalkPair motion{ walk.camera, motionBetween(walk, reference, current), pair.reference.size() };
+  pair.truth = [motion](const std::vector<Answer>& answers) {
+    return std::vector<Correspondences>{ trueMatches(motion, answers) };
+  };
+  pair.baseline = motion.current_from_reference.translation().norm();
+  pair.rotation = DEGREES * Eigen::AngleAxisd(motion.current_from_reference.linear()).angle();
+  return pair;
+}
+
+/** The pairs that come with the walk. */
 std::vector<RoomPair> walkPairs(const fs::path& data)
 {
   const IndoorWalk walk = readIndoorWalk(data);
   std::vector<RoomPair> pairs;
   for (std::size_t i = 0; i < walk.pairs.size(); i += 2)  // in one direction
   {
-    const IndoorWalk::Pair& known = walk.pairs[i];
-    RoomPair pair;
-    pair.set = "hololens_indoor";
-    pair.name = fs::path(known.reference).stem().string() + "-" + fs::path(known.current).stem().string();
-    pair.reference = readGreyImage((data / pair.set / "images" / known.reference).string());
-    pair.current = readGreyImage((data / pair.set / "images" / known.current).string());
-    const WalkPair motion{ walk.camera, walk.poses.at(known.current).inverse() * walk.poses.at(known.reference),
-                           pair.reference.size() };
-    pair.truth = [motion](const std::vector<Answer>& answers) {
-      return std::vector<Correspondences>{ trueMatches(motion, answers) };
-    };
-    pair.baseline = known.baseline;
-    pair.rotation = known.rotation;
-    pairs.push_back(std::move(pair));
+    pairs.push_back(walkPair(data, walk, "hololens_indoor", walk.pairs[i].reference, walk.pairs[i].current));
+  }
+  return pairs;
+}
+
+/** Other pairs of its views, no more than there are, that are near each other and show much of the same. */
+std::vector<RoomPair> drawnWalkPairs(const fs::path& data, int count, Rng& rng)
+{
+  constexpr double LEAST_BASELINE = 0.1;     // [m]
+  constexpr double LARGEST_BASELINE = 1.5;   // [m]
+  constexpr double LARGEST_ROTATION = 60.0;  // [degrees]
+  constexpr double LEAST_OVERLAP = 0.3;      // share of the one picture that the other one shows
+  constexpr double DEPTH = 3.0;              // at which overlap is reckoned [m]
+  const IndoorWalk walk = readIndoorWalk(data);
+  std::set<std::pair<std::string, std::string>> given;
+  for (const IndoorWalk::Pair& pair : walk.pairs)
+  {
+    given.emplace(pair.reference, pair.current);
+  }
+  const cv::Size size = readWalkImage(data, walk.poses.begin()->first).size();
+  std::vector<std::pair<std::string, std::string>> names;
+  for (const auto& [reference, unused_pose] : walk.poses)
+  {
+    for (const auto& [current, unused_other_pose] : walk.poses)
+    {
+      const WalkPair motion{ walk.camera, motionBetween(walk, reference, current), size };
+      const double baseline = motion.current_from_reference.translation().norm();
+      const double rotation = DEGREES * Eigen::AngleAxisd(motion.current_from_reference.linear()).angle();
+      if (reference != current && given.count({ reference, current }) == 0 && baseline >= LEAST_BASELINE &&
+          baseline <= LARGEST_BASELINE && rotation <= LARGEST_ROTATION && motion.overlapAt(DEPTH) >= LEAST_OVERLAP)
+      {
+        names.emplace_back(reference, current);
+      }
+    }
+  }
+  std::vector<RoomPair> pairs;
+  for (; count > 0 && !names.empty(); --count)
+  {
+    const auto drawn = names.begin() + static_cast<std::ptrdiff_t>(uniformIndex(rng, names.size()));
+    pairs.push_back(walkPair(data, walk, "hololens_indoor drawn", drawn->first, drawn->second));
+    names.erase(drawn);
   }
   return pairs;
 }
@@ -370,6 +437,11 @@ void runRoomsExperiment(const ExperimentContext& context, std::ostream& csv)
     methods.push_back(std::move(peer));
   }
   std::vector<RoomPair> pairs = allPairs(context.data);
+  Rng rng(context.seedOf(DRAWN_WALK_PAIRS, DRAWN_WALK_PAIRS.seed));
+  for (RoomPair& pair : drawnWalkPairs(context.data, context.runsOf(DRAWN_WALK_PAIRS), rng))
+  {
+    pairs.push_back(std::move(pair));
+  }
   if (context.brief)
   {
     pairs.resize(2);
