@@ -437,14 +437,14 @@ void runRoomsExperiment(const ExperimentContext& context, std::ostream& csv)
     methods.push_back(std::move(peer));
   }
   std::vector<RoomPair> pairs = allPairs(context.data);
+  if (context.brief)
+  {
+    pairs.resize(2);
+  }
   Rng rng(context.seedOf(DRAWN_WALK_PAIRS, DRAWN_WALK_PAIRS.seed));
   for (RoomPair& pair : drawnWalkPairs(context.data, context.runsOf(DRAWN_WALK_PAIRS), rng))
   {
     pairs.push_back(std::move(pair));
-  }
-  if (context.brief)
-  {
-    pairs.resize(2);
   }
   std::map<std::pair<std::string, std::string>, RoomsSummary> summaries;  // of set and method
   csv << "set,pair,baseline_m,rotation_deg,method,answer,error_px,inliers,ms\n";
