@@ -250,13 +250,13 @@ TYPED_TEST_P(EveryDriverTest, StandsWhileItIsHeld)
 TYPED_TEST_P(EveryDriverTest, SurvivesWhateverIsInMessages)
 {
   this->robot_.publishExtremes();  // without a goal
-  this->drive();
+  this->driveAfterExtremes();
   this->robot_.publishExtremes();  // with one: it may end it, by a reason
   this->client_.cancelAllGoals();
   EXPECT_TRUE(waitUntil([this] { return this->client_.getState().isDone(); })) << this->reason();
   EXPECT_FALSE(this->client_.getState().getText().empty());
   EXPECT_TRUE(waitUntil([this] { return !this->commands_.moving(); }));
-  this->drive();  // and it goes on
+  this->driveAfterExtremes();  // and it goes on
 }
 
 TYPED_TEST_P(EveryDriverTest, TakesManyGoalsWhilePeersComeAndGo)

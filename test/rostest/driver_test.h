@@ -249,6 +249,19 @@ protected:
     ASSERT_TRUE(waitUntil([this] { return commands_.moving(); })) << reason();
   }
 
+  /** The same after extreme messages: the last of them may come only when the goal has begun, and end it by its reason. */
+  void driveAfterExtremes()
+  {
+    send("goal");
+    ASSERT_TRUE(waitUntil([this] { return commands_.moving() || client_.getState().isDone(); })) << reason();
+    if (!commands_.moving())
+    {
+      EXPECT_FALSE(client_.getState().getText().empty());
+      send("goal");
+    }
+    ASSERT_TRUE(waitUntil([this] { return commands_.moving(); })) << reason();
+  }
+
   /** Sends a goal whose view nobody matches or follows, and waits until it waits for that. */
   void prepareInVain(double timeout = 60.0)
   {
