@@ -8,14 +8,15 @@
 #include "view_servo/robust/fundamental_estimator.h"
 #include "view_servo/robust/homography_estimator.h"
 #include "view_servo/robust/orientation.h"
+#include "view_servo/robust/parallax.h"
 #include "view_servo/robust/significance.h"
 
 #include <Eigen/LU>
 
 #include <algorithm>
 #include <cmath>
+#include <cstddef>
 #include <iterator>
-#include <limits>
 #include <utility>
 
 namespace view_servo

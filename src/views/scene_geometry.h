@@ -5,7 +5,6 @@
 #include "view_servo/features/corners.h"
 #include "view_servo/geometry/correspondence.h"
 #include "view_servo/matching/guided_matching.h"
-#include "view_servo/robust/parallax.h"
 #include "view_servo/robust/random.h"
 #include "view_servo/robust/ransac.h"
 #include "view_servo/views/prepared_image.h"

@@ -2,6 +2,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <cstddef>
 #include <string>
 #include <vector>
 
@@ -11,9 +12,9 @@ namespace view_servo
 inline std::string join(const std::vector<std::string>& texts, const std::string& separator)
 {
   std::string all;
-  for (const std::string& text : texts)
+  for (std::size_t i = 0; i < texts.size(); ++i)
   {
-    all += (all.empty() ? "" : separator) + text;
+    all += (i == 0 ? "" : separator) + texts[i];
   }
   return all;
 }
