@@ -25,15 +25,9 @@ Svd3 singularValues(const Eigen::Matrix3d& matrix)
   return { svd.matrixU(), svd.singularValues(), svd.matrixV() };
 }
 
-template Eigen::Matrix<double, 2, 1> solveSymmetric(const Eigen::Matrix<double, 2, 2>&,
-                                                    const Eigen::Matrix<double, 2, 1>&);
-template Eigen::Matrix<double, 3, 1> solveSymmetric(const Eigen::Matrix<double, 3, 3>&,
-                                                    const Eigen::Matrix<double, 3, 1>&);
-template Eigen::Matrix<double, 5, 1> solveSymmetric(const Eigen::Matrix<double, 5, 5>&,
-                                                    const Eigen::Matrix<double, 5, 1>&);
-template Eigen::Matrix<double, 7, 1> solveSymmetric(const Eigen::Matrix<double, 7, 7>&,
-                                                    const Eigen::Matrix<double, 7, 1>&);
-template Eigen::Matrix<double, 9, 1> solveSymmetric(const Eigen::Matrix<double, 9, 9>&,
-                                                    const Eigen::Matrix<double, 9, 1>&);
+SmallVector solveSmallSymmetric(const SmallMatrix& a, const SmallVector& b)
+{
+  return a.ldlt().solve(b);
+}
 
 }  // namespace view_servo

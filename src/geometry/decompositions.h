@@ -34,23 +34,19 @@ struct Svd3
 
 Svd3 singularValues(const Eigen::Matrix3d& matrix);
 
+/** Up to 9 x 9, without memory from the heap. */
+using SmallMatrix = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::ColMajor, 9, 9>;
+using SmallVector = Eigen::Matrix<double, Eigen::Dynamic, 1, Eigen::ColMajor, 9, 1>;
+
 /** The solution x of A x = b, A symmetric and positive semidefinite. */
+SmallVector solveSmallSymmetric(const SmallMatrix& a, const SmallVector& b);
+
+/** solveSmallSymmetric() for a size that is known: one for each would take a compiler five seconds each. */
 template <int N>
 Eigen::Matrix<double, N, 1> solveSymmetric(const Eigen::Matrix<double, N, N>& a, const Eigen::Matrix<double, N, 1>& b)
 {
-  return a.ldlt().solve(b);
+  return solveSmallSymmetric(a, b);
 }
-
-extern template Eigen::Matrix<double, 2, 1> solveSymmetric(const Eigen::Matrix<double, 2, 2>&,
-                                                           const Eigen::Matrix<double, 2, 1>&);
-extern template Eigen::Matrix<double, 3, 1> solveSymmetric(const Eigen::Matrix<double, 3, 3>&,
-                                                           const Eigen::Matrix<double, 3, 1>&);
-extern template Eigen::Matrix<double, 5, 1> solveSymmetric(const Eigen::Matrix<double, 5, 5>&,
-                                                           const Eigen::Matrix<double, 5, 1>&);
-extern template Eigen::Matrix<double, 7, 1> solveSymmetric(const Eigen::Matrix<double, 7, 7>&,
-                                                           const Eigen::Matrix<double, 7, 1>&);
-extern template Eigen::Matrix<double, 9, 1> solveSymmetric(const Eigen::Matrix<double, 9, 9>&,
-                                                           const Eigen::Matrix<double, 9, 1>&);
 
 /** L D Lᵀ of a symmetric, positive semidefinite matrix of any size, its rows exchanged where that is more exact. */
 class SymmetricDecomposition
