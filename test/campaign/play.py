@@ -1,0 +1,159 @@
+# Copyright (c) 2026, the view_servo authors
+# SPDX-License-Identifier: BSD-3-Clause
+"""One run: a goal, a fault at a random moment of it, what came of it, and whether that was good."""
+import random
+import time
+
+import faults
+import relay
+import robot_graph
+
+from actionlib.simple_action_client import SimpleGoalState
+
+TIMEOUT = 20.0    # of a goal [s]
+PATIENCE = 8.0    # how much longer than its goal's timeout a driver may take to say how it ended [s]
+REST = 0.5        # after the end, in which nothing may move [s]
+EARLY = 0.15      # share of the faults that begin before the robot may have moved
+
+COLUMNS = ("driver", "fault", "form", "run", "seed", "moment", "expected", "limit", "zero", "ended", "success", "reason", "standing",
+           "off", "turn", "farthest", "interrupted", "verdict", "why")
+
+
+class Run:
+    def __init__(self, graph, fault, form, number, seed):
+        self.graph, self.fault, self.form = graph, fault, form
+        self.draw = random.Random("%s %s %s %d %d" % (graph.robot.name, fault.name, form, number, seed))
+        self.row = dict.fromkeys(COLUMNS, "")
+        self.row.update(driver=graph.robot.name, fault=fault.name, form=form, run=number, seed=seed, expected=fault.expected,
+                        limit=fault.limit)
+        self.problems = []
+
+    def ended(self):
+        return self.graph.client.simple_state == SimpleGoalState.DONE  # the result has come, too
+
+    def wait(self, seconds, holds=lambda: False):
+        end = time.monotonic() + seconds
+        while time.monotonic() < end:
+            if holds():
+                return True
+            time.sleep(0.01)
+        return holds()
+
+    def wait_for_the_moment(self):
+        """@return whether the goal still went on then."""
+        graph = self.graph
+        start = graph.off()[0]
+        if self.draw.random() < EARLY:
+            wait = self.draw.uniform(0.0, 0.7)
+            self.row["moment"] = "%.2f s" % wait
+            self.wait(wait)
+        else:
+            share = self.draw.uniform(0.06, 0.97)
+            self.row["moment"] = "%.0f %%" % (100.0 * (1.0 - share))
+            self.wait(TIMEOUT, lambda: self.ended() or graph.off()[0] < share * start)
+        return not self.ended()
+
+    def play(self):
+        """@return the row of the table; None: the goal had ended before the fault could begin."""
+        graph = self.graph
+        graph.place(graph.robot.start_pose(self.draw))
+        for heard in (graph.commands, graph.statuses, graph.truths):
+            heard.clear()
+        self.start_off = graph.off()[0]
+        graph.client.send_goal(graph.robot.goal(TIMEOUT))
+        if not self.wait_for_the_moment():
+            graph.client.cancel_goal()
+            return None
+        truths_before = list(graph.truths)
+        begin = self.fault.begin(graph, self.draw)
+        try:
+            if self.form == "passes":
+                self.wait(self.fault.duration)
+            else:
+                self.wait(TIMEOUT + PATIENCE, self.is_over)
+            end = relay.now()
+            self.judge_stop(begin, end)
+            if self.form == "stays" and self.fault.needs != "master":
+                self.judge_interrupt()
+        finally:
+            self.fault.end(graph)
+        if self.form == "passes":
+            self.wait(TIMEOUT + PATIENCE, self.is_over)
+        self.judge_end()
+        self.judge_place(truths_before)
+        self.row["verdict"] = "bad" if self.problems else "good"
+        self.row["why"] = "; ".join(self.problems)
+        return self.row
+
+    def driver_lives(self):
+        process = self.graph.processes[self.graph.robot.driver]
+        return process.poll() is None
+
+    def is_over(self):
+        return self.ended() or (self.graph.robot.driver in self.fault.nodes and isinstance(self.fault, faults.Killed))
+
+    # ---------------------------------------------------------------------------------------------------------- judgement
+
+    def judge_stop(self, begin, end):
+        time.sleep(0.1)  # what was sent before the end has to come
+        last = self.graph.last_motion(begin, end)
+        zero = 0.0 if last is None else last - begin
+        stopping = self.fault.expected == faults.STOPS
+        self.row["zero"] = "%.3f" % zero
+        if stopping and zero > self.fault.limit:
+            self.problems.append("moves %.2f s after the fault" % zero)
+        reasons = [status.reason for moment, status in list(self.graph.statuses) if begin <= moment <= end]
+        self.row["standing"] = reasons[-1] if reasons else ""
+
+    def judge_interrupt(self):
+        """Nodes have to end although the fault lasts; those that it concerns itself do not run."""
+        self.wait(TIMEOUT + PATIENCE, self.is_over)
+        self.result = self.take_result()
+        names = [name for name in self.graph.robot.nodes if name not in self.fault.nodes]
+        seconds, name, status = self.graph.interrupt(names)
+        self.row["interrupted"] = "%.2f" % seconds
+        if seconds > robot_graph.ENDS_WITHIN:
+            self.problems.append("%s ends %.1f s after SIGINT" % (name, seconds))
+        if status != 0:
+            self.problems.append("%s ends with status %d after SIGINT" % (name, status))
+
+    def take_result(self):
+        return self.graph.client.get_result() if self.ended() else None
+
+    def judge_end(self):
+        result = getattr(self, "result", None) or self.take_result()
+        dead = isinstance(self.fault, faults.Killed) and self.graph.robot.driver in self.fault.nodes
+        self.row["ended"] = "dead" if dead else "yes" if result is not None else "no"
+        self.row["success"] = int(bool(result and result.success))
+        self.row["reason"] = result.message if result is not None else ""
+        if result is None and not dead:
+            self.problems.append("the goal does not end")
+            self.graph.client.cancel_goal()
+        if result is not None and not result.message:
+            self.problems.append("it ends without a reason")
+        if any(not status.reason for _, status in list(self.graph.statuses)):
+            self.problems.append("a status has no reason")
+        if self.fault.expected == faults.SURVIVES and not (result and result.success):
+            self.problems.append("it does not arrive")
+        if result is not None and result.message.count("\n"):
+            self.problems.append("a reason of several lines")
+        for name, process in self.graph.processes.items():
+            if process.poll() not in (None, 0) and name not in self.fault.nodes and not self.row["interrupted"]:
+                self.problems.append("%s has ended by itself with status %d" % (name, process.returncode))
+
+    def judge_place(self, truths_before):
+        time.sleep(REST)
+        graph = self.graph
+        self.row["off"], self.row["turn"] = ("%.4f" % value for value in graph.off())
+        moved = self.fault.moves_robot
+        begin = self.start_off if not moved else max(self.start_off, max((off for _, off, _ in graph.truths[len(truths_before):]
+                                                                          [:3]), default=0.0))
+        farthest = max((off for _, off, _ in list(graph.truths)), default=begin) - begin
+        self.row["farthest"] = "%.3f" % farthest
+        far = farthest > graph.robot.allowance
+        if far:
+            self.problems.append("%.2f m farther from its view than when it began" % farthest)
+        off, turn = graph.off()
+        most_off, most_turn = graph.robot.arrived
+        if self.row["success"] and (off > most_off or turn > most_turn):
+            self.problems.append("wrong arrival: %.1f mm and %.2f degrees off" % (1e3 * off, 57.2958 * turn))
