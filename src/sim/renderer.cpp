@@ -13,6 +13,8 @@
 #include <cmath>
 #include <cstddef>
 #include <cstdlib>
+#include <mutex>
+#include <set>
 #include <stdexcept>
 #include <utility>
 
@@ -32,10 +34,59 @@ double shade(const Surface& surface)
   return surface.brightness * (AMBIENT + (1.0 - AMBIENT) * (0.5 + 0.5 * normal.dot(LIGHT_DIRECTION)));
 }
 
+/** For calls of OSMesa's own: Mesa 20 changes lists there that all threads share. */
+std::mutex& mesaMutex()
+{
+  static std::mutex mutex;
+  return mutex;
+}
+
+/**
+ * A number of columns beside the picture's that no other context of the process has meanwhile. Mesa 20 has contexts of the
+ * same size draw into one buffer, from whatever threads they draw: so no two are to be of the same size. Not of rows, as Mesa
+ * counts these from the far end, and rounds otherwise then.
+ */
+class OwnColumns
+{
+public:
+  OwnColumns()
+  {
+    const std::lock_guard<std::mutex> lock(mesaMutex());
+    while (!taken().insert(count_).second)
+    {
+      ++count_;
+    }
+  }
+
+  ~OwnColumns()
+  {
+    const std::lock_guard<std::mutex> lock(mesaMutex());
+    taken().erase(count_);
+  }
+
+  OwnColumns(const OwnColumns&) = delete;
+  OwnColumns& operator=(const OwnColumns&) = delete;
+
+  int count() const
+  {
+    return count_;
+  }
+
+private:
+  static std::set<int>& taken()
+  {
+    static std::set<int> counts;
+    return counts;
+  }
+
+  int count_ = 0;
+};
+
 }  // namespace
 
 struct SimulatedCamera::Context
 {
+  OwnColumns own_columns;
   OSMesaContext context = nullptr;
   std::vector<unsigned char> buffer;  // RGBA
   cv::Size size;
@@ -48,8 +99,11 @@ struct SimulatedCamera::Context
     // too, one is quicker. Who sets the variable has the last word.
     constexpr int KEEP_WHAT_IS_SET = 0;
     setenv("LP_NUM_THREADS", "1", KEEP_WHAT_IS_SET);
-    context = OSMesaCreateContextExt(OSMESA_RGBA, DEPTH_BITS, 0, 0, nullptr);
-    buffer.resize(4 * static_cast<std::size_t>(size.area()));
+    {
+      const std::lock_guard<std::mutex> lock(mesaMutex());
+      context = OSMesaCreateContextExt(OSMESA_RGBA, DEPTH_BITS, 0, 0, nullptr);
+    }
+    buffer.resize(4 * static_cast<std::size_t>(size.height) * (size.width + own_columns.count()));
     if (context == nullptr)
     {
       throw std::runtime_error("OSMesa gives no OpenGL context");
@@ -58,6 +112,7 @@ struct SimulatedCamera::Context
 
   ~Context()
   {
+    const std::lock_guard<std::mutex> lock(mesaMutex());
     OSMesaDestroyContext(context);
   }
 
@@ -67,12 +122,15 @@ struct SimulatedCamera::Context
   /** To be called when done: the next call may come from another thread. */
   static void release()
   {
+    const std::lock_guard<std::mutex> lock(mesaMutex());
     OSMesaMakeCurrent(nullptr, nullptr, GL_UNSIGNED_BYTE, 0, 0);
   }
 
   void makeCurrent()
   {
-    if (OSMesaMakeCurrent(context, buffer.data(), GL_UNSIGNED_BYTE, size.width, size.height) != GL_TRUE)
+    const std::lock_guard<std::mutex> lock(mesaMutex());
+    const int columns = size.width + own_columns.count();
+    if (OSMesaMakeCurrent(context, buffer.data(), GL_UNSIGNED_BYTE, columns, size.height) != GL_TRUE)
     {
       throw std::runtime_error("OSMesa refuses an image of " + std::to_string(size.width) + " x " +
                                std::to_string(size.height) + " pixels");
@@ -134,6 +192,12 @@ struct SimulatedCamera::Context
     }
     glEndList();
     release();
+  }
+
+  /** The picture drawn last, RGBA, in this context's memory. */
+  cv::Mat drawn()
+  {
+    return cv::Mat(size.height, size.width + own_columns.count(), CV_8UC4, buffer.data()).colRange(0, size.width);
   }
 
   /** The first row of the image ends up first in the buffer: OpenGL's lowest. */
@@ -241,9 +305,8 @@ cv::Mat SimulatedCamera::render(const Eigen::Isometry3d& camera)
   k(0, 2) += 0.5 * (s - 1.0);
   k(1, 2) += 0.5 * (s - 1.0);
   context_->draw(k, camera);
-  const cv::Mat drawn(context_->size, CV_8UC4, context_->buffer.data());
   cv::Mat grey;
-  cv::extractChannel(drawn, grey, 0);
+  cv::extractChannel(context_->drawn(), grey, 0);
   if (quality_.supersampling > 1)
   {
     cv::resize(grey, grey, pinhole_size_, 0.0, 0.0, cv::INTER_AREA);

@@ -10,9 +10,13 @@
 #include <opencv2/core.hpp>
 #include <opencv2/imgproc.hpp>
 
+#include <atomic>
 #include <cmath>
+#include <cstddef>
+#include <memory>
 #include <stdexcept>
 #include <string>
+#include <thread>
 #include <vector>
 
 namespace view_servo::sim
@@ -252,6 +256,43 @@ TEST(SimulatedCamera, FarTexturesDoNotAlias)
   cv::meanStdDev(camera.capture(view)(cv::Rect(280, 200, 80, 80)), mean, deviation);
   EXPECT_LT(deviation[0], 2.0);
   EXPECT_GT(mean[0], 60.0);
+}
+
+/** As trials in several threads do; some Mesa draw what is of the same size into one buffer. */
+TEST(SimulatedCamera, DrawsBesideOthersOfItsSizeInOtherThreadsAsAlone)
+{
+  constexpr std::size_t CAMERAS = 4;
+  constexpr int PICTURES = 25;
+  const World world = checkerWorld();
+  Rng rng(11);
+  std::vector<Eigen::Isometry3d> views;
+  std::vector<cv::Mat> alone;
+  for (std::size_t i = 0; i < CAMERAS; ++i)
+  {
+    views.push_back(randomView(rng));
+    alone.push_back(SimulatedCamera(world, {}, 1).capture(views.back()));
+  }
+  std::vector<std::unique_ptr<SimulatedCamera>> cameras;
+  for (std::size_t i = 0; i < CAMERAS; ++i)
+  {
+    cameras.push_back(std::make_unique<SimulatedCamera>(world, std::vector<std::string>{}, 1));
+  }
+  std::atomic<int> different{ 0 };
+  std::vector<std::thread> threads;
+  for (std::size_t i = 0; i < CAMERAS; ++i)
+  {
+    threads.emplace_back([&, i] {
+      for (int picture = 0; picture < PICTURES; ++picture)
+      {
+        different += cv::norm(cameras[i]->capture(views[i]), alone[i], cv::NORM_INF) > 0.0;
+      }
+    });
+  }
+  for (std::thread& thread : threads)
+  {
+    thread.join();
+  }
+  EXPECT_EQ(different, 0);
 }
 
 }  // namespace view_servo::sim
