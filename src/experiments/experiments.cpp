@@ -5,7 +5,8 @@
  * Runs the thesis' experiments on this implementation: `experiments NAME [--out DIR]` writes NAME.csv, and NAME.png
  * beside it, drawn by plot_experiment. `--list` names the experiments, what each of them repeats, how often, and from
  * which seed. Those that need real images read them from VIEW_SERVO_DATA. Exit status: 0 table and plot are there, 1
- * only the table is, 2 neither.
+ * only the table is, 2 neither. `campaign` and `soak` are programs of their own, which run simulated robots with their nodes
+ * and say themselves how that ended.
  */
 #include "experiments/arm_experiments.h"
 #include "experiments/arm_geometry_experiment.h"
@@ -19,6 +20,7 @@
 #include "experiments/lines_table.h"
 #include "experiments/profile_experiments.h"
 #include "experiments/recognition_experiment.h"
+#include "experiments/robot_programs.h"
 #include "experiments/rooms_experiment.h"
 #include "experiments/routes_experiment.h"
 #include "experiments/structure_experiment.h"
@@ -49,6 +51,8 @@ struct Experiment
   bool needs_data;                       ///< real images, from VIEW_SERVO_DATA
   std::optional<Repetition> repetition;  ///< empty: there are no random numbers
   std::function<void(const ExperimentContext& context, std::ostream& csv)> run;
+  std::string program = {};  ///< of the source tree, which is started instead; empty: none
+  bool takes_hours = false;
 
   bool takesSeed() const
   {
@@ -95,6 +99,10 @@ const std::vector<Experiment>& experiments()
       runHandEyeRealExperiment },
     { "cyclic_order", "figures 7.5 to 7.11: cyclic order against plain votes", false, DRAWN_PICTURES,
       runCyclicOrderExperiment },
+    { "campaign", "faults at random moments of simulated runs, by nodes", false, CAMPAIGN_RUNS, nullptr,
+      "test/campaign/campaign.py" },
+    { "soak", "goals without end in both simulators, with memory, threads and latencies; --hours 1", false, SOAK_DRAWS,
+      nullptr, "test/campaign/soak.py", true },
   };
   return all;
 }
@@ -128,18 +136,32 @@ std::string namesOf(bool (Experiment::*holds)() const)
   return names;
 }
 
-/** @throws std::invalid_argument when the experiment has no use for --runs or --seed, and they are given. */
-void refuseUselessOptions(const Experiment& experiment, const ExperimentContext& context)
+/** What the command line asks for. */
+struct Request
 {
-  if (context.seed && !experiment.takesSeed())
+  std::string name;  ///< of the experiment; empty: none is named
+  std::string out = ".";
+  bool list = false;
+  ExperimentContext context;
+  std::optional<double> hours;
+};
+
+/** @throws std::invalid_argument when the experiment has no use for --runs, --seed or --hours, and they are given. */
+void refuseUselessOptions(const Experiment& experiment, const Request& request)
+{
+  if (request.context.seed && !experiment.takesSeed())
   {
     throw std::invalid_argument("--seed: " + experiment.name + " draws no random numbers; " +
                                 namesOf(&Experiment::takesSeed) + " do");
   }
-  if (context.runs > 0 && !experiment.takesRuns())
+  if (request.context.runs > 0 && !experiment.takesRuns())
   {
     throw std::invalid_argument("--runs: " + experiment.name + " repeats nothing; " + namesOf(&Experiment::takesRuns) +
                                 " do");
+  }
+  if (request.hours && !experiment.takes_hours)
+  {
+    throw std::invalid_argument("--hours: " + experiment.name + " ends by itself; the soak does not");
   }
 }
 
@@ -165,15 +187,6 @@ bool plot(const fs::path& csv, const fs::path& png)
   return std::system(command.c_str()) == 0;  // NOLINT(cert-env33-c): of our own package, paths quoted
 }
 
-/** What the command line asks for. */
-struct Request
-{
-  std::string name;  ///< of the experiment; empty: none is named
-  std::string out = ".";
-  bool list = false;
-  ExperimentContext context;
-};
-
 /** Empty when only help was asked for, which is printed then. @throws std::exception when an option is wrong. */
 std::optional<Request> readRequest(int argc, char** argv)
 {
@@ -185,6 +198,7 @@ std::optional<Request> readRequest(int argc, char** argv)
   line.flag("short", request.context.brief, "A small part of it, to see that it works");
   line.number("runs", runs, { 1.0, 1e6 }, "How often to repeat what --list says is repeated");
   line.number("seed", request.context.seed, {}, "From which all random numbers are drawn");
+  line.number("hours", request.hours, { 1e-3, 1e4 }, "How long the soak lasts");
   line.number("threads", request.context.threads, { 0.0, 1024.0 },
               "At most so many; 0: as many as there are processors");
   line.flag("list", request.list, "Names the experiments, with their runs and seeds");
@@ -218,7 +232,6 @@ const Experiment& findExperiment(const std::string& name)
 /** Writes the table and its plot. @returns the exit status. @throws std::exception when there is no table. */
 int run(const Experiment& experiment, ExperimentContext context, const fs::path& out)
 {
-  refuseUselessOptions(experiment, context);
   if (experiment.needs_data)
   {
     const auto data = dataFolder();
@@ -268,7 +281,16 @@ int main(int argc, char** argv)
       }
       return 0;
     }
-    return run(findExperiment(request->name), request->context, request->out);
+    const Experiment& experiment = findExperiment(request->name);
+    refuseUselessOptions(experiment, *request);
+    if (!experiment.program.empty())
+    {
+      const int runs = request->context.runs;
+      becomeRobotProgram(experiment.program,
+                         { request->out, request->context.brief, runs > 0 ? std::optional<int>(runs) : std::nullopt,
+                           request->context.seed, request->hours });
+    }
+    return run(experiment, request->context, request->out);
   }
   catch (const std::exception& error)
   {

@@ -17,6 +17,7 @@ HERE = os.path.dirname(os.path.abspath(__file__))
 sys.path[:0] = [HERE, os.path.join(os.path.dirname(HERE), "docs"), os.path.join(os.path.dirname(HERE), "rostest")]
 
 ATTEMPTS = 3  # at a run whose goal ends before the fault begins
+DRIVERS = ["homing", "servo_25d", "route_follower"]
 KINDS = ("robot", "clock", "disk", "master")
 
 
@@ -62,7 +63,7 @@ def play_all(options, kind, writer):
                         break
                 if row:
                     writer(row)
-                    print("%-9s %-34s %-6s %5.1f s  zero %s  %s%s" % (
+                    print("%-14s %-34s %-6s %5.1f s  zero %s  %s%s" % (
                         options.driver, fault.name, form, time.monotonic() - begin, row["zero"], row["verdict"],
                         ": " + row["why"] if row["why"] else ""), flush=True)
                 if kind == "master":
@@ -115,11 +116,11 @@ def summary(rows):
 
 
 def print_summary(rows):
-    print("\n%-9s %-34s %-8s %4s %7s %7s %5s %4s %6s  %s" % (
+    print("\n%-14s %-34s %-8s %4s %7s %7s %5s %4s %6s  %s" % (
         "driver", "fault", "expected", "runs", "arrived", "zero[s]", "wrong", "far", "SIGINT", "verdict; other ends"))
     for line in summary(rows):
         zero = "%7.3f" % line["zero"] if line["expected"] == "stops" else "      -"
-        print("%-9s %-34s %-8s %4d %7d %s %5d %4d %6.2f  %s; %s" % (
+        print("%-14s %-34s %-8s %4d %7d %s %5d %4d %6.2f  %s; %s" % (
             line["driver"], line["fault"], line["expected"], line["runs"], line["arrived"], zero, line["wrong"], line["far"],
             line["interrupted"], line["verdict"], " | ".join(line["reasons"])))
     stopping = [float(row["zero"]) for row in rows if row["expected"] == "stops" and "processors" not in row["fault"]]
@@ -139,7 +140,7 @@ def main():
     parser.add_argument("--runs", type=positive, default=1, help="of each fault with each driver")
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--out", default=".", help="folder for campaign.csv")
-    parser.add_argument("--driver", choices=("homing", "servo_25d"), help="this one only")
+    parser.add_argument("--driver", choices=DRIVERS, help="this one only")
     parser.add_argument("--fault", action="append", default=[], metavar="TEXT", help="only faults whose names have this in them")
     parser.add_argument("--list", action="store_true", help="names the faults")
     parser.add_argument("--worker", choices=KINDS, help=argparse.SUPPRESS)
@@ -147,12 +148,12 @@ def main():
     options = parser.parse_args()
     if options.worker:
         return work(options)
-    drivers = [options.driver] if options.driver else ["homing", "servo_25d"]
+    drivers = [options.driver] if options.driver else DRIVERS
     chosen = {driver: chosen_faults(driver, options.fault) for driver in drivers}
     if options.list:
         for driver in drivers:
             for fault in chosen[driver]:
-                print("%-9s %-34s %s" % (driver, fault.name, fault.expected))
+                print("%-14s %-34s %s" % (driver, fault.name, fault.expected))
         return 0
     if not any(chosen.values()):
         parser.error("no fault's name has this in it; see --list")

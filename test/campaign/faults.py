@@ -255,16 +255,21 @@ def of_cameras():
              FullDisk(), MasterRestarted()])
 
 
+def of_bases(driver, others=()):
+    matchers = ["point_matcher", "line_matcher"]
+    return (of_cameras() + of_input("odometry", STOPS, STOPS, STOPS, STOPS, STOPS, STOPS) +
+            of_input("point_matches", BOUNDED, BOUNDED, BOUNDED, BOUNDED, BOUNDED, BOUNDED) +
+            of_input("line_matches", BOUNDED, BOUNDED, BOUNDED, BOUNDED, BOUNDED, BOUNDED) +
+            [Turned("camera turned round", STOPS), Busy("odometry", STOPS),
+             Killed([driver], STOPS), Killed(["nomad_sim"], STOPS, passes=False), Killed(matchers, BOUNDED),
+             Stopped([driver], STOPS), Stopped(["nomad_sim"], STOPS), Stopped(matchers, BOUNDED)] +
+            [kind([node], BOUNDED) for node in matchers for kind in (Killed, Stopped)] +
+            [kind([node], SURVIVES) for node in ("view_store", *others) for kind in (Killed, Stopped)])
+
+
 FAULTS = {
-    "homing": of_cameras() + of_input("odometry", STOPS, STOPS, STOPS, STOPS, STOPS, STOPS) +
-    of_input("point_matches", BOUNDED, BOUNDED, BOUNDED, BOUNDED, BOUNDED, BOUNDED) +
-    of_input("line_matches", BOUNDED, BOUNDED, BOUNDED, BOUNDED, BOUNDED, BOUNDED) + [
-        Turned("camera turned round", STOPS),
-        Busy("odometry", STOPS),
-        Killed(["point_matcher"], BOUNDED), Killed(["line_matcher"], BOUNDED), Killed(["point_matcher", "line_matcher"], BOUNDED),
-        Killed(["view_store"], SURVIVES), Killed(["homing"], STOPS), Killed(["nomad_sim"], STOPS, passes=False),
-        Stopped(["point_matcher"], BOUNDED), Stopped(["line_matcher"], BOUNDED), Stopped(["point_matcher", "line_matcher"], BOUNDED),
-        Stopped(["view_store"], SURVIVES), Stopped(["homing"], STOPS), Stopped(["nomad_sim"], STOPS)],
+    "homing": of_bases("homing"),
+    "route_follower": of_bases("route_follower", ["route_recorder"]),
     "servo_25d": of_cameras() + of_input("homography", STOPS, STOPS, STOPS, STOPS, STOPS, BOUNDED) +
     of_input("joint_states", STOPS, BOUNDED, BOUNDED, BOUNDED, BOUNDED, BOUNDED, JOINT_LIMIT) + [
         Busy("homography", STOPS),

@@ -29,7 +29,7 @@ class Run:
         self.problems = []
 
     def ended(self):
-        return self.graph.client.simple_state == SimpleGoalState.DONE  # the result has come, too
+        return self.graph.client is None or self.graph.client.simple_state == SimpleGoalState.DONE  # the result has come, too
 
     def wait(self, seconds, holds=lambda: False):
         end = time.monotonic() + seconds
@@ -85,12 +85,11 @@ class Run:
         self.row["why"] = "; ".join(self.problems)
         return self.row
 
-    def driver_lives(self):
-        process = self.graph.processes[self.graph.robot.driver]
-        return process.poll() is None
-
     def is_over(self):
-        return self.ended() or (self.graph.robot.driver in self.fault.nodes and isinstance(self.fault, faults.Killed))
+        return self.ended() or self.kills_driver()
+
+    def kills_driver(self):
+        return isinstance(self.fault, faults.Killed) and self.graph.robot.driver in self.fault.nodes
 
     # ---------------------------------------------------------------------------------------------------------- judgement
 
@@ -118,11 +117,13 @@ class Run:
             self.problems.append("%s ends with status %d after SIGINT" % (name, status))
 
     def take_result(self):
-        return self.graph.client.get_result() if self.ended() else None
+        """None: there is none, or the driver that it would have come from has been started anew."""
+        client = self.graph.client
+        return client.get_result() if client is not None and self.ended() else None
 
     def judge_end(self):
         result = getattr(self, "result", None) or self.take_result()
-        dead = isinstance(self.fault, faults.Killed) and self.graph.robot.driver in self.fault.nodes
+        dead = self.kills_driver()
         self.row["ended"] = "dead" if dead else "yes" if result is not None else "no"
         self.row["success"] = int(bool(result and result.success))
         self.row["reason"] = result.message if result is not None else ""

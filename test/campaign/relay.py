@@ -287,9 +287,11 @@ class Channel:
         self._subscriber = rospy.Subscriber(source, message, self._take, queue_size=50, buff_size=2 ** 23, tcp_nodelay=True)
 
     def publish(self, message):
-        if rospy.is_shutdown():
-            return  # the runs have ended
-        self._publisher.publish(message)
+        try:
+            self._publisher.publish(message)
+        except rospy.ROSException:
+            if not rospy.is_shutdown():  # the runs have ended
+                raise
 
     def publishers(self):
         """How many nodes publish what this channel does."""

@@ -16,14 +16,15 @@ import relay  # noqa: E402
 import robots  # noqa: E402
 
 import actionlib  # noqa: E402
+import numpy  # noqa: E402
 import roslaunch.config  # noqa: E402
 import roslaunch.xmlloader  # noqa: E402
 import roslib.packages  # noqa: E402
 import rospy  # noqa: E402
 from geometry_msgs.msg import PoseStamped  # noqa: E402
-from std_srvs.srv import SetBool  # noqa: E402
+from std_srvs.srv import SetBool, Trigger  # noqa: E402
 from view_servo.msg import ServoStatus  # noqa: E402
-from view_servo.srv import SaveView, SaveViewRequest, SetLight, SetPose  # noqa: E402
+from view_servo.srv import SaveView, SaveViewRequest, SetLight, SetPose, StartRoute  # noqa: E402
 
 ENDS_WITHIN = 2.0  # of SIGINT [s]
 SMALL_DISK = "8m"
@@ -67,7 +68,8 @@ class RobotGraph:
                 self.start(name)
         self.client = None
         self.wait_for_nodes()
-        self.save_view()
+        self.view_picture = None
+        self.record_route() if robot.name == "route_follower" else self.save_view()
 
     # ------------------------------------------------------------------------------------------------------------ nodes
 
@@ -203,7 +205,39 @@ class RobotGraph:
         answer = self.call("/view_store/save", SaveView, request)
         if not answer.success:
             raise AssertionError(answer.message)
+        self.keep_goal()
+
+    def keep_goal(self):
         self.view_picture = relay.pixels(self.channels["image"].last).copy()
         self.goal_truth = self.truth
+
+    def record_route(self):
+        """Drives the base from where the route begins to the world's goal, by the ground truth."""
+        self.place(robots.base_pose(*self.robot.BEGIN))
+        answer = self.call("/route_recorder/start", StartRoute, "goal")
+        if not answer.success:
+            raise AssertionError(answer.message)
+        commands = rospy.Publisher("/cmd_vel", self.robot.command_type, queue_size=1)
+
+        def there():
+            x, y, yaw = robots.planar(self.truth)
+            way = numpy.hypot(x, y)
+            command = self.robot.command_type()
+            if way > 0.02:
+                command.linear.x, command.linear.y = (numpy.cos(yaw) * -x + numpy.sin(yaw) * -y,
+                                                      -numpy.sin(yaw) * -x + numpy.cos(yaw) * -y)
+                command.linear.x *= 0.15 / way
+                command.linear.y *= 0.15 / way
+                command.angular.z = -0.3 * yaw
+            commands.publish(command)
+            return way <= 0.02
+
+        graph.wait_until("the end of the route", there)
+        time.sleep(1.0)
+        answer = self.call("/route_recorder/stop", Trigger)
+        if not answer.success:
+            raise AssertionError(answer.message)
+        commands.unregister()
+        self.keep_goal()
 
 

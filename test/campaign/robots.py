@@ -16,8 +16,8 @@ import genpy.message  # noqa: E402
 from geometry_msgs.msg import TransformStamped, Twist, TwistStamped  # noqa: E402
 from nav_msgs.msg import Odometry  # noqa: E402
 from sensor_msgs.msg import CameraInfo, Image, JointState  # noqa: E402
-from view_servo.msg import Homography, HomeToViewAction, HomeToViewGoal, LineMatches, PointMatches, ServoToViewAction, \
-    ServoToViewGoal  # noqa: E402
+from view_servo.msg import FollowRouteAction, FollowRouteGoal, Homography, HomeToViewAction, HomeToViewGoal, LineMatches, \
+    PointMatches, ServoToViewAction, ServoToViewGoal  # noqa: E402
 from view_servo.srv import SetPoseRequest  # noqa: E402
 
 # The Python side of tf2_msgs is not needed for anything else, and need not be installed.
@@ -113,6 +113,24 @@ class Base(Robot):
         return float(numpy.hypot(x - gx, y - gy)), abs(float((yaw - gyaw + numpy.pi) % (2 * numpy.pi) - numpy.pi))
 
 
+class RouteBase(Base):
+    """The same base, which follows a route. Its goal is the route's last view."""
+    name = driver = "route_follower"
+    file = "route.launch"
+    action, action_type = "/follow", FollowRouteAction
+    nodes = ("route_follower", "route_recorder", "point_matcher", "line_matcher", "view_store")
+    BEGIN = (-0.9, 0.3, -0.05)  # of the route, in the world [m, m, rad]
+
+    @staticmethod
+    def goal(timeout):
+        return FollowRouteGoal(route="goal", timeout=timeout)
+
+    @staticmethod
+    def start_pose(draw):
+        x, y, yaw = RouteBase.BEGIN
+        return base_pose(x + draw.uniform(-0.05, 0.05), y + draw.uniform(-0.1, 0.1), yaw + draw.uniform(-0.04, 0.04))
+
+
 class Arm(Robot):
     name = driver = "servo_25d"
     simulator, simulator_file, file = "puma_sim", "puma_sim.launch", "arm_servo.launch"
@@ -153,7 +171,7 @@ class Arm(Robot):
         return float(numpy.linalg.norm([place.x - there.x, place.y - there.y, place.z - there.z])), float(angle)
 
 
-ROBOTS = {robot.name: robot for robot in (Base(), Arm())}
+ROBOTS = {robot.name: robot for robot in (Base(), Arm(), RouteBase())}
 
 
 def rotation(stamped):

@@ -11,6 +11,8 @@
 #include <gtest/gtest.h>
 
 #include <cstdint>
+#include <filesystem>
+#include <fstream>
 #include <iterator>
 #include <optional>
 #include <sstream>
@@ -60,7 +62,7 @@ TEST(Experiments, RefusesRunsWhereNothingIsRepeated)
     expectContains(outcome.err,
                    "homing, homing_differential, homing_structure, routes, arm, multi_hypothesis, real_pairs, "
                    "profiles_parameters, "
-                   "view_consistency, rooms, false_answers, recognition, hand_eye, cyclic_order do");
+                   "view_consistency, rooms, false_answers, recognition, hand_eye, cyclic_order, campaign do");
   }
 }
 
@@ -89,6 +91,33 @@ TEST(Experiments, RefusesNumbersOutOfRange)
     EXPECT_NE(outcome.status, 0) << value;
     expectContains(outcome.err, "--seed");
   }
+}
+
+TEST(Experiments, RefusesATimeWhereNoneIsTaken)
+{
+  const ProgramRun outcome = run("campaign --hours 1");
+  EXPECT_EQ(outcome.status, 2);
+  expectContains(outcome.err, "--hours: campaign ends by itself");
+  expectContains(run("soak --runs 1").err, "--runs: soak repeats nothing");
+}
+
+TEST(Experiments, TellsAProgramItsOptionsAndEndsAsItDoes)
+{
+  const test::TemporaryDirectory package;
+  std::filesystem::create_directories(package.path() / "test" / "campaign");
+  std::ofstream(package.path() / "package.xml") << "<package><name>view_servo</name></package>\n";
+  const std::string elsewhere = "export ROS_PACKAGE_PATH='" + package.path().string() + "'";
+  const ProgramRun missing = test::runProgram(EXPERIMENTS_PATH, { "soak" }, elsewhere);
+  EXPECT_EQ(missing.status, 2);
+  expectContains(missing.err, "soak.py is not there: this runs from the package's source tree only");
+
+  const std::filesystem::path script = package.path() / "test" / "campaign" / "soak.py";
+  std::ofstream(script) << "#!/bin/sh\necho \"$@\"\nexit 7\n";
+  std::filesystem::permissions(script, std::filesystem::perms::owner_all);
+  const ProgramRun started =
+      test::runProgram(EXPERIMENTS_PATH, { "soak", "--hours", "0.5", "--seed", "3", "--out", "there" }, elsewhere);
+  EXPECT_EQ(started.status, 7);
+  EXPECT_EQ(started.out, "--out there --seed 3 --hours 0.5\n");
 }
 
 TEST(Experiments, SaysSeedAndRuns)
