@@ -3,8 +3,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """
 Plays each fault at random moments of simulated runs: campaign.py [--runs N] [--seed N] [--out DIR] [--driver NAME]
-[--fault TEXT ...] [--list]. Writes DIR/campaign.csv, a row a run, and prints a table. Exit status: 0 all verdicts are good, 1
-some are not, 2 bad input.
+[--fault TEXT ...] [--list]. Writes DIR/campaign.csv, a row a run, beside it what happened in runs that were bad, and prints a
+table. Exit status: 0 all verdicts are good, 1 some are not, 2 bad input.
 """
 import argparse
 import csv
@@ -55,14 +55,15 @@ def play_all(options, kind, writer):
             for number, form in enumerate(forms_of(fault, options.runs, order)):
                 for attempt in range(ATTEMPTS):
                     begin = time.monotonic()
-                    row = play.Run(graph, fault, form, number, options.seed + 1000 * attempt).play()
+                    run = play.Run(graph, fault, form, number, options.seed + 1000 * attempt)
+                    row = run.play()
                     if kind == "master":
                         break
                     graph.restore()
                     if row:
                         break
                 if row:
-                    writer(row)
+                    writer(row, run)
                     print("%-14s %-34s %-6s %5.1f s  zero %s  %s%s" % (
                         options.driver, fault.name, form, time.monotonic() - begin, row["zero"], row["verdict"],
                         ": " + row["why"] if row["why"] else ""), flush=True)
@@ -78,9 +79,12 @@ def work(options):
     with open(options.rows, "a", newline="") as file:
         table = csv.DictWriter(file, play.COLUMNS)
 
-        def write(row):
+        def write(row, run):
             table.writerow(row)
             file.flush()
+            if row["verdict"] != "good":
+                with open(options.rows + ".traces", "a") as traces:
+                    print(*("%s: %s" % pair for pair in row.items()), *run.trace(), "", sep="\n", file=traces)
 
         play_all(options, options.worker, write)
 
@@ -162,6 +166,8 @@ def main():
     path = os.path.join(options.out, "campaign.csv")
     with open(path, "w", newline="") as file:
         csv.DictWriter(file, play.COLUMNS).writeheader()
+    if os.path.exists(path + ".traces"):
+        os.remove(path + ".traces")
     failures = []
     for driver in drivers:
         for kind in KINDS:

@@ -15,9 +15,10 @@ STOPS = "stops"        # no command that moves later than the limit after the fa
 BOUNDED = "bounded"    # may stand or go on, as far as documented: it never arrives wrongly nor gets too far
 SURVIVES = "survives"  # goes on, and arrives
 
-LIMIT = 0.3         # until zero twist [s]
-BUSY_LIMIT = 0.5    # the same with all processors taken by others [s]
-JOINT_LIMIT = 1.3   # joint states may be missing for ~joint_timeout, 1 s, before that counts
+LIMIT = 0.3 * graph.SLOWDOWN  # until zero twist [s]
+BUSY_LIMIT = 0.5 * graph.SLOWDOWN  # the same with all processors taken by others [s]
+JOINT_LIMIT = 1.0 + LIMIT  # joint states may be missing for ~joint_timeout, 1 s, before that counts
+MATCH_LIMIT = 1.5 + LIMIT  # a view that is not seen any more is noticed by matches: three periods of those by lines, 2 Hz, more
 MANY = 10000        # messages at once
 MANY_IMAGES = 300   # the same of images, 92 MB
 
@@ -126,9 +127,9 @@ class Stopped(Fault):
     """By SIGSTOP, and continued."""
     duration = 2.0
 
-    def __init__(self, nodes, expected, limit=LIMIT):
+    def __init__(self, nodes, expected, limit=LIMIT, stays=True):
         super().__init__("stopped: %s" % ", ".join(nodes), expected, limit)
-        self.nodes = nodes
+        self.nodes, self.stays = nodes, stays
 
     def begin(self, robot_graph, draw):
         for node in self.nodes:
@@ -260,9 +261,9 @@ def of_bases(driver, others=()):
     return (of_cameras() + of_input("odometry", STOPS, STOPS, STOPS, STOPS, STOPS, STOPS) +
             of_input("point_matches", BOUNDED, BOUNDED, BOUNDED, BOUNDED, BOUNDED, BOUNDED) +
             of_input("line_matches", BOUNDED, BOUNDED, BOUNDED, BOUNDED, BOUNDED, BOUNDED) +
-            [Turned("camera turned round", STOPS), Busy("odometry", STOPS),
+            [Turned("camera turned round", STOPS, MATCH_LIMIT), Busy("odometry", STOPS),
              Killed([driver], STOPS), Killed(["nomad_sim"], STOPS, passes=False), Killed(matchers, BOUNDED),
-             Stopped([driver], STOPS), Stopped(["nomad_sim"], STOPS), Stopped(matchers, BOUNDED)] +
+             Stopped([driver], STOPS, stays=False), Stopped(["nomad_sim"], STOPS), Stopped(matchers, BOUNDED)] +
             [kind([node], BOUNDED) for node in matchers for kind in (Killed, Stopped)] +
             [kind([node], SURVIVES) for node in ("view_store", *others) for kind in (Killed, Stopped)])
 
@@ -276,5 +277,5 @@ FAULTS = {
         Killed(["homography_tracker"], STOPS), Killed(["view_store"], SURVIVES), Killed(["robot_state_publisher"], BOUNDED),
         Killed(["servo_25d"], STOPS), Killed(["puma_sim"], STOPS, passes=False),
         Stopped(["homography_tracker"], STOPS), Stopped(["view_store"], SURVIVES), Stopped(["robot_state_publisher"], BOUNDED),
-        Stopped(["servo_25d"], STOPS), Stopped(["puma_sim"], STOPS)],
+        Stopped(["servo_25d"], STOPS, stays=False), Stopped(["puma_sim"], STOPS)],
 }

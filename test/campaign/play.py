@@ -7,11 +7,12 @@ import time
 import faults
 import relay
 import robot_graph
+from graph import SLOWDOWN
 
 from actionlib.simple_action_client import SimpleGoalState
 
-TIMEOUT = 20.0    # of a goal [s]
-PATIENCE = 8.0    # how much longer than its goal's timeout a driver may take to say how it ended [s]
+TIMEOUT = 20.0 * SLOWDOWN  # of a goal [s]
+PATIENCE = 8.0 * SLOWDOWN  # how much longer than its goal's timeout a driver may take to say how it ended [s]
 REST = 0.5        # after the end, in which nothing may move [s]
 EARLY = 0.15      # share of the faults that begin before the robot may have moved
 
@@ -27,6 +28,9 @@ class Run:
         self.row.update(driver=graph.robot.name, fault=fault.name, form=form, run=number, seed=seed, expected=fault.expected,
                         limit=fault.limit)
         self.problems = []
+        self.result = None     # of the goal
+        self.start_off = 0.0   # how far from its goal the robot begins [m]
+        self.begin = 0.0       # when the fault does [s]
 
     def ended(self):
         return self.graph.client is None or self.graph.client.simple_state == SimpleGoalState.DONE  # the result has come, too
@@ -65,7 +69,7 @@ class Run:
             graph.client.cancel_goal()
             return None
         truths_before = list(graph.truths)
-        begin = self.fault.begin(graph, self.draw)
+        begin = self.begin = self.fault.begin(graph, self.draw)
         try:
             if self.form == "passes":
                 self.wait(self.fault.duration)
@@ -90,6 +94,19 @@ class Run:
 
     def kills_driver(self):
         return isinstance(self.fault, faults.Killed) and self.graph.robot.driver in self.fault.nodes
+
+    def trace(self):
+        """What happened, in lines: changes of the status, of motion, and how far off the robot was, by the time after the fault."""
+        graph = self.graph
+        lines = [(moment, "%d %s" % (status.state, status.reason)) for moment, status in list(graph.statuses)]
+        lines += [(moment, "moves" if any(twist) else "stands") for moment, twist in list(graph.commands)]
+        lines += [(moment, "%.3f m, %.3f rad off" % (off, turn)) for moment, off, turn in list(graph.truths)]
+        told = {}
+        for moment, text in sorted(lines):
+            kind = text in ("moves", "stands"), text.endswith("off")
+            if told.get(kind) != text:
+                told[kind] = text
+                yield "%8.3f  %s" % (moment - self.begin, text)
 
     # ---------------------------------------------------------------------------------------------------------- judgement
 
@@ -122,14 +139,15 @@ class Run:
         return client.get_result() if client is not None and self.ended() else None
 
     def judge_end(self):
-        result = getattr(self, "result", None) or self.take_result()
+        result = self.result or self.take_result()
         dead = self.kills_driver()
         self.row["ended"] = "dead" if dead else "yes" if result is not None else "no"
         self.row["success"] = int(bool(result and result.success))
         self.row["reason"] = result.message if result is not None else ""
         if result is None and not dead:
             self.problems.append("the goal does not end")
-            self.graph.client.cancel_goal()
+            if self.graph.client is not None:
+                self.graph.client.cancel_goal()
         if result is not None and not result.message:
             self.problems.append("it ends without a reason")
         if any(not status.reason for _, status in list(self.graph.statuses)):
