@@ -124,9 +124,14 @@ std::vector<EuclideanHomography> Problem::motionsBefore(const Eigen::Vector3d& n
 
 bool Problem::errors(const State& state, std::size_t i, Eigen::VectorXd& errors) const
 {
+  return this->errors(state, i, observations_[i].base_in_flange, errors);
+}
+
+bool Problem::errors(const State& state, std::size_t i, const Eigen::Isometry3d& base_in_flange,
+                     Eigen::VectorXd& errors) const
+{
   errors.resize(ROWS);
-  const Eigen::Isometry3d camera_from_view =
-      state.camera_in_flange.inverse() * observations_[i].base_in_flange * state.view_in_base;
+  const Eigen::Isometry3d camera_from_view = state.camera_in_flange.inverse() * base_in_flange * state.view_in_base;
   for (int corner = 0; corner < CORNERS; ++corner)
   {
     const Eigen::Vector3d& ray = rays_[static_cast<std::size_t>(corner)];
@@ -149,11 +154,16 @@ double Problem::squaredError(const State& state, std::size_t i) const
 
 void Problem::linearize(const State& state, std::size_t i, Eigen::MatrixXd& by_state, Eigen::MatrixXd& by_arm) const
 {
+  linearize(state, observations_[i].base_in_flange, by_state, by_arm);
+}
+
+void Problem::linearize(const State& state, const Eigen::Isometry3d& base_in_flange, Eigen::MatrixXd& by_state,
+                        Eigen::MatrixXd& by_arm) const
+{
   by_state.resize(ROWS, DOF);
   by_arm.resize(ROWS, 6);
-  const Observation& observation = observations_[i];
   const Eigen::Matrix3d camera_from_flange = state.camera_in_flange.linear().transpose();
-  const Eigen::Matrix3d camera_from_base = camera_from_flange * observation.base_in_flange.linear();
+  const Eigen::Matrix3d camera_from_base = camera_from_flange * base_in_flange.linear();
   const Eigen::Matrix<double, 3, 2> basis = squareTo(state.normal);
   for (int corner = 0; corner < CORNERS; ++corner)
   {
@@ -161,7 +171,7 @@ void Problem::linearize(const State& state, std::size_t i, Eigen::MatrixXd& by_s
     const double facing = state.normal.dot(ray);
     const Eigen::Vector3d in_view = ray * (state.distance / facing);
     const Eigen::Vector3d turned = state.view_in_base.linear() * in_view;
-    const Eigen::Vector3d in_flange = observation.base_in_flange * (state.view_in_base * in_view);
+    const Eigen::Vector3d in_flange = base_in_flange * (state.view_in_base * in_view);
     const Eigen::Vector3d in_camera = state.camera_in_flange.inverse() * in_flange;
 
     const Eigen::Vector3d pixel = view_.k * in_camera;

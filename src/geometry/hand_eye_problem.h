@@ -84,6 +84,9 @@ public:
 
   /** Where the view's corners should be, less where they are [px], ROWS x 1. False when a corner is behind the camera. */
   bool errors(const State& state, std::size_t i, Eigen::VectorXd& errors) const;
+  /** The same with the flange elsewhere than the robot has it [m]. */
+  bool errors(const State& state, std::size_t i, const Eigen::Isometry3d& base_in_flange,
+              Eigen::VectorXd& errors) const;
 
   /** Mean squared distance of a pose's corners from where they should be [px²]. */
   double squaredError(const State& state, std::size_t i) const;
@@ -93,6 +96,9 @@ public:
    * its own axes (ROWS x 6) [px per m or rad].
    */
   void linearize(const State& state, std::size_t i, Eigen::MatrixXd& by_state, Eigen::MatrixXd& by_arm) const;
+  /** The same with the flange elsewhere than the robot has it [m]. */
+  void linearize(const State& state, const Eigen::Isometry3d& base_in_flange, Eigen::MatrixXd& by_state,
+                 Eigen::MatrixXd& by_arm) const;
 
   /** Weight of distanceError(): so large that a known distance is kept; 0 when none is known. */
   double distanceWeight() const;
