@@ -1,5 +1,6 @@
 // Copyright (c) 2026, the view_servo authors
 // SPDX-License-Identifier: BSD-3-Clause
+#include "tools/calibration_files.h"
 #include "tools/command_line.h"
 #include "tools/hand_eye_bag.h"
 #include "tools/hand_eye_session.h"
@@ -16,8 +17,6 @@
 
 #include <chrono>
 #include <cstdint>
-#include <cstdio>
-#include <ctime>
 #include <exception>
 #include <filesystem>
 #include <iostream>
@@ -49,19 +48,6 @@ struct Options
   bool overwrite = false;
 };
 
-/** Numbers with a fixed number of decimals, separated by spaces. */
-std::string fixed(const std::vector<double>& values, int decimals)
-{
-  std::string text;
-  for (const double value : values)
-  {
-    char number[32];
-    std::snprintf(number, sizeof number, "%.*f", decimals, value);
-    text += (text.empty() ? "" : " ") + std::string(number);
-  }
-  return text;
-}
-
 int usedOf(const HandEyeResult& result)
 {
   int used = 0;
@@ -89,37 +75,6 @@ std::string advice(const HandEyeSession& session, const HandEyeParams& params)
              : "move the arm to another pose, with the view in the picture, and let it stand for a second";
 }
 
-/** Of today, with the time. */
-std::string date()
-{
-  const std::time_t now = std::time(nullptr);
-  char text[32];
-  std::strftime(text, sizeof text, "%Y-%m-%d %H:%M", std::localtime(&now));
-  return text;
-}
-
-HandEyePosesFile posesOf(const HandEyeSession& session, const HandEyeSources& sources)
-{
-  HandEyePosesFile poses;
-  poses.base_frame = sources.base_frame;
-  poses.flange_frame = sources.flange_frame;
-  poses.camera_frame = session.cameraFrame();
-  poses.view_name = sources.view;
-  poses.view = session.view();
-  poses.poses = session.poses();
-  return poses;
-}
-
-void keepPoses(HandEyePosesFile poses, const Options& options)
-{
-  if (!options.keep.empty())
-  {
-    poses.comment = "calibrate_hand_eye, " + date() + ": poses for its option --file";
-    writeHandEyePosesFile(poses, options.keep);
-    std::cout << poses.poses.size() << " poses are kept in " << options.keep << std::endl;
-  }
-}
-
 /** Says what came of it, and writes the file. @return the exit status. */
 int finish(const HandEyePosesFile& poses, const HandEyeResult& result, const Options& options)
 {
@@ -139,21 +94,12 @@ int finish(const HandEyePosesFile& poses, const HandEyeResult& result, const Opt
   file.flange_frame = poses.flange_frame;
   file.camera_frame = poses.camera_frame;
   file.camera_in_flange = result.camera_in_flange;
-  for (int row = 0; row < 6; ++row)
-  {
-    for (int column = 0; column < 6; ++column)
-    {
-      file.covariance.push_back(result.covariance(row, column));
-    }
-  }
-  file.comment = "calibrate_hand_eye, " + date() + ": view " + poses.view_name + ", " + std::to_string(usedOf(result)) +
-                 " of " + std::to_string(result.residuals.size()) + " poses";
+  file.covariance = numbersOf(result.covariance);
+  file.comment = "calibrate_hand_eye, " + dateAndTime() + ": view " + poses.view_name + ", " +
+                 std::to_string(usedOf(result)) + " of " + std::to_string(result.residuals.size()) + " poses";
   writeHandEyeFile(file, options.out);
 
-  const Eigen::Vector3d place = result.camera_in_flange.translation();
-  const Eigen::Quaterniond turn(result.camera_in_flange.linear());
-  const std::string numbers =
-      fixed({ place.x(), place.y(), place.z() }, 6) + " " + fixed({ turn.x(), turn.y(), turn.z(), turn.w() }, 8);
+  const std::string numbers = numbersOf(result.camera_in_flange);
   std::cout << "errors: images " << fixed({ result.image_error }, 2) << " px, arm "
             << fixed({ 1e3 * result.translation_error }, 2) << " mm and "
             << fixed({ DEGREES * result.rotation_error }, 3) << " degrees; the plane was "
@@ -178,7 +124,7 @@ int runOffline(const Options& options, const HandEyeParams& params)
   const HandEyePosesFile poses =
       bag ? readHandEyeBag(options.file, options.sources) : readHandEyePosesFile(options.file);
   std::cout << poses.poses.size() << " poses before view '" << poses.view_name << "' in " << options.file << std::endl;
-  keepPoses(poses, options);
+  keepPoses(poses, options.keep, "calibrate_hand_eye");
   return finish(poses, calibrateHandEye(poses.view, poses.poses, params), options);
 }
 
@@ -208,7 +154,7 @@ int run(const Options& options, const HandEyeParams& params)
     const HandEyePosesFile poses = posesOf(session, options.sources);
     if (!poses.poses.empty())
     {
-      keepPoses(poses, options);
+      keepPoses(poses, options.keep, "calibrate_hand_eye");
     }
     return finish(poses, found, options);
   };
@@ -312,14 +258,8 @@ std::optional<Options> readOptions(int argc, char** argv)
     throw std::runtime_error("say which stored view: --view NAME");
   }
   sources.views_dir = views_dir;
-  if (!options.overwrite && std::filesystem::exists(options.out))
-  {
-    throw std::runtime_error("'" + options.out + "' exists: say --overwrite, or another file by --out");
-  }
-  if (!options.overwrite && !options.keep.empty() && std::filesystem::exists(options.keep))
-  {
-    throw std::runtime_error("'" + options.keep + "' exists: say --overwrite, or another file by --keep");
-  }
+  refuseToReplace(options.out, "--out", options.overwrite);
+  refuseToReplace(options.keep, "--keep", options.overwrite);
   return options;
 }
 

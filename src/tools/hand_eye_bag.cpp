@@ -105,13 +105,18 @@ HandEyePosesFile posesIn(const rosbag::Bag& bag, const HandEyeSources& sources)
   if (located == 0)
   {
     throw std::runtime_error("its tf does not know '" + sources.flange_frame + "' in '" + sources.base_frame + "' (" +
-                             lacks + "): record /tf and /tf_static, too, or say --base and --flange");
+                             lacks + "): record /tf and /tf_static, too, or say " + sources.frameOptions());
   }
   result.base_frame = sources.base_frame;
   result.flange_frame = sources.flange_frame;
   result.view_name = sources.view;
   result.view = collector.view();
   result.poses = collector.poses();
+  const std::string flange = withoutSlash(sources.flange_frame);
+  if (sources.on_base && frames.canTransform(flange, result.camera_frame, ros::Time(0)))
+  {
+    result.camera_height = frames.lookupTransform(flange, result.camera_frame, ros::Time(0)).transform.translation.z;
+  }
   return result;
 }
 

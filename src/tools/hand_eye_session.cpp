@@ -53,17 +53,22 @@ HandEyeSession::HandEyeSession(const ros::NodeHandle& nh, const HandEyeSources& 
     throw std::runtime_error("'" + info_topic + "': " + fault);
   }
   collector_ = HandEyeCollector(handEyeViewOf(stored, camera));
+  camera_frame_ = withoutSlash(info->header.frame_id);
   wait_for([&] {
     const std::string missing = transforms_.missing(sources_.base_frame, sources_.flange_frame, ros::Time(0));
-    return missing.empty() ? missing : missing + ": say --base and --flange with the arm's frames";
+    return missing.empty() ? missing : missing + ": say " + sources_.frameOptions() + " with the robot's frames";
   });
   const std::string start = sources.tracker + "/start";
   wait_for([&] {
     constexpr bool PRINT_FAILURE = false;
     return ros::service::exists(start, PRINT_FAILURE)
                ? std::string()
-               : "the node '" + sources_.tracker +
-                     "' does not run: roslaunch view_servo arm_servo.launch sim:=false odom_frame:=\"\" starts it";
+               : "the node '" + sources_.tracker + "' does not run: " +
+                     (sources_.on_base
+                          ? "rosrun view_servo homography_tracker image_raw:=" + sources_.camera +
+                                "/image_raw camera_info:=" + sources_.camera + "/camera_info _odom_frame:=\"\""
+                          : "roslaunch view_servo arm_servo.launch sim:=false odom_frame:=\"\"") +
+                     " starts it";
   });
   SetView service;
   service.request.view = sources.view;
@@ -150,6 +155,16 @@ bool HandEyeSession::update()
     hindrance_ = "nothing comes from '" + sources_.tracker + "'";
   }
   return added;
+}
+
+std::optional<Eigen::Isometry3d> HandEyeSession::cameraByTf() const
+{
+  constexpr double NO_WAIT = 0.0;
+  if (!transforms_.missing(sources_.flange_frame, camera_frame_, ros::Time(0)).empty())
+  {
+    return std::nullopt;
+  }
+  return toIsometry(transforms_.lookUp(sources_.flange_frame, camera_frame_, ros::Time(0), NO_WAIT).transform);
 }
 
 /** @return whether a pose was added. */

@@ -22,15 +22,22 @@
 
 namespace view_servo
 {
-/** Where calibrate_hand_eye finds what it needs. */
+/** Where calibrate_hand_eye and calibrate_mount find what they need. */
 struct HandEyeSources
 {
   std::string view;                 ///< name of the stored view
   std::filesystem::path views_dir;  ///< where it is stored; empty: as viewsDir() says
-  std::string base_frame;           ///< of the arm
+  std::string base_frame;           ///< of the arm; of odometry for a mobile base
   std::string flange_frame;         ///< of what the camera is mounted on
   std::string camera;               ///< namespace of camera_info
   std::string tracker;              ///< node homography_tracker
+  bool on_base = false;             ///< the camera is on a mobile base
+
+  /** The options that name both frames. */
+  std::string frameOptions() const
+  {
+    return on_base ? "--odom-frame and --base" : "--base and --flange";
+  }
 };
 
 /**
@@ -73,11 +80,13 @@ public:
   {
     return collector_.poses();
   }
-  /** frame_id of the camera's images; empty until it is known. */
+  /** frame_id of the camera's images; of its camera_info until one has come. */
   const std::string& cameraFrame() const
   {
     return camera_frame_;
   }
+  /** Where tf has the camera on the flange [m]; empty when it does not know that. */
+  std::optional<Eigen::Isometry3d> cameraByTf() const;
 
 private:
   using Clock = std::chrono::steady_clock;

@@ -141,6 +141,10 @@ HandEyePosesFile posesFromYaml(const YAML::Node& root)
     throw std::runtime_error("it has not all of parameters, view and poses");
   }
   readFrames(parameters, file);
+  if (const YAML::Node height = root["camera_height"])
+  {
+    file.camera_height = height.as<double>();
+  }
   file.view_name = entry(view, "view", "name").as<std::string>();
   file.view.k = readMatrix(view, "view", "camera_matrix");
   for (const std::vector<double>& corner : entry(view, "view", "corners").as<std::vector<std::vector<double>>>())
@@ -224,6 +228,10 @@ void writeHandEyePosesFile(const HandEyePosesFile& poses, const std::string& pat
   out.SetDoublePrecision(DIGITS);
   out << YAML::Comment(poses.comment) << YAML::BeginMap;
   writeFrames(out, poses);
+  if (!std::isnan(poses.camera_height))
+  {
+    out << YAML::Key << "camera_height" << YAML::Value << poses.camera_height;
+  }
   out << YAML::Key << "view" << YAML::Value << YAML::BeginMap << YAML::Key << "name" << YAML::Value << poses.view_name
       << YAML::Key << "camera_matrix" << YAML::Value;
   writeMatrix(out, poses.view.k);

@@ -6,6 +6,7 @@
 
 #include <Eigen/Geometry>
 
+#include <limits>
 #include <string>
 #include <vector>
 
@@ -41,11 +42,13 @@ struct HandEyePosesFile
   std::string view_name;     ///< name of the stored view
   HandEyeView view;
   std::vector<HandEyePose> poses;
+  /** Of a mobile base's camera above the base's frame, where tf knows it [m]; NaN: it does not. */
+  double camera_height = std::numeric_limits<double>::quiet_NaN();
   std::string comment;  ///< one line; is written, not read
 };
 
 /**
- * Reads a file as writeHandEyePosesFile() writes it: `parameters` as in a HandEyeFile; `view` with name, camera_matrix (9
+ * Reads a file as writeHandEyePosesFile() writes it: `parameters` as in a HandEyeFile; `camera_height`, if it is known; `view` with name, camera_matrix (9
  * numbers by rows) and corners (4 pairs); `poses`, each with flange (x, y, z, qx, qy, qz, qw) and homography (9 numbers by
  * rows, x_cur ~ H x_view).
  * @throws std::runtime_error naming the file and what is wrong with it.
