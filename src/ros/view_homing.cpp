@@ -216,7 +216,8 @@ void ViewHoming::onFrame(const CameraFrame& frame)
     context_.abort("the camera's calibration has changed");
     setTask(nullptr);
   }
-  const std::string apart = stampsApart(odometry_.input(), images_);
+  // Odometry that has ceased is missing, whatever its last stamp was.
+  const std::string apart = odometry_.input().fresh() ? stampsApart(odometry_.input(), images_) : "";
   odd_stamps_ = apart.empty() ? 0 : odd_stamps_ + 1;
   if (odd_stamps_ >= ODD_STAMPS)
   {

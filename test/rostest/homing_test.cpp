@@ -323,6 +323,19 @@ TEST_F(HomingNodeTest, StopsWhenOdometryStopsAndGoesOnWithIt)
   expectToStopWhile(robot_.moves_odometry, "no odometry");
 }
 
+TEST_F(HomingNodeTest, WaitsForOdometryThatIsGoneForLongerThanStampsMayBeApart)
+{
+  constexpr std::chrono::milliseconds LONG(1200);
+  drive();
+  expectToStop([this] { robot_.moves_odometry = false; }, ServoStatus::LOST, "no odometry");
+  const Clock::time_point begin = Clock::now();
+  EXPECT_TRUE(waitUntil([&] { return Clock::now() - begin > LONG; }));
+  EXPECT_FALSE(client_.getState().isDone()) << reason();
+  EXPECT_NE(reason().find("no odometry"), std::string::npos) << reason();
+  robot_.moves_odometry = true;
+  expectToGoOn();
+}
+
 TEST_F(HomingNodeTest, RefusesAndStopsForOdometryOfAnotherTime)
 {
   drive();
