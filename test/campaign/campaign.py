@@ -3,12 +3,13 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """
 Plays each fault at random moments of simulated runs: campaign.py [--runs N] [--seed N] [--out DIR] [--driver NAME]
-[--fault TEXT ...] [--list]. Writes DIR/campaign.csv, a row a run, beside it what happened in runs that were bad, and prints a
-table. Exit status: 0 all verdicts are good, 1 some are not, 2 bad input.
+[--fault TEXT ...] [--list]. Writes DIR/campaign.csv, a row a run, beside it what happened in runs that were bad or did not
+arrive, and prints a table. Exit status: 0 all verdicts are good, 1 some are not, 2 bad input.
 """
 import argparse
 import csv
 import os
+import signal
 import subprocess
 import sys
 import time
@@ -82,7 +83,7 @@ def work(options):
         def write(row, run):
             table.writerow(row)
             file.flush()
-            if row["verdict"] != "good":
+            if row["verdict"] != "good" or (row["form"] == "passes" and not row["success"]):
                 with open(options.rows + ".traces", "a") as traces:
                     print(*("%s: %s" % pair for pair in row.items()), *run.trace(), "", sep="\n", file=traces)
 
@@ -186,4 +187,6 @@ def main():
 
 
 if __name__ == "__main__":
+    # Ctrl-C ends it as it does elsewhere also where a shell has started it in the background.
+    signal.signal(signal.SIGINT, signal.default_int_handler)
     sys.exit(main())

@@ -75,7 +75,7 @@ class Judged(unittest.TestCase):
         def judge(run):
             run.judge_stop(10.0, 12.0)
         self.assertEqual(self.problems(self.run_of(last_motion=lambda begin, end: begin + 0.9 * faults.LIMIT), judge), "")
-        self.assertIn("moves", self.problems(self.run_of(last_motion=lambda begin, end: begin + 1.1 * faults.LIMIT), judge))
+        self.assertIn("moves", self.problems(self.run_of(last_motion=lambda begin, end: begin + 1.1 * faults.BUSY_LIMIT), judge))
 
     def test_ends(self):
         run = self.run_of()

@@ -240,7 +240,7 @@ def of_input(channel, stops, broken, late, jump, repeats, two, stop_limit=LIMIT)
 
 def of_cameras():
     return (of_input("image", STOPS, STOPS, STOPS, STOPS, STOPS, BOUNDED) +
-            of_input("camera_info", STOPS, STOPS, STOPS, STOPS, STOPS, STOPS) +
+            of_input("camera_info", STOPS, STOPS, STOPS, STOPS, STOPS, BOUNDED) +
             of_input("tf", BOUNDED, BOUNDED, BOUNDED, BOUNDED, BOUNDED, BOUNDED) +
             [LightOff("light off", STOPS),
              OfPicture("camera covered", relay.covered, STOPS),

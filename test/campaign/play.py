@@ -1,6 +1,7 @@
 # Copyright (c) 2026, the view_servo authors
 # SPDX-License-Identifier: BSD-3-Clause
 """One run: a goal, a fault at a random moment of it, what came of it, and whether that was good."""
+import os
 import random
 import time
 
@@ -9,15 +10,15 @@ import relay
 import robot_graph
 from graph import SLOWDOWN
 
-from actionlib.simple_action_client import SimpleGoalState
+from actionlib import CommState
 
 TIMEOUT = 20.0 * SLOWDOWN  # of a goal [s]
 PATIENCE = 8.0 * SLOWDOWN  # how much longer than its goal's timeout a driver may take to say how it ended [s]
 REST = 0.5        # after the end, in which nothing may move [s]
 EARLY = 0.15      # share of the faults that begin before the robot may have moved
 
-COLUMNS = ("driver", "fault", "form", "run", "seed", "moment", "expected", "limit", "zero", "ended", "success", "reason", "standing",
-           "off", "turn", "farthest", "interrupted", "verdict", "why")
+COLUMNS = ("driver", "fault", "form", "run", "seed", "moment", "expected", "limit", "load", "zero", "ended", "success", "reason",
+           "standing", "off", "turn", "farthest", "interrupted", "verdict", "why")
 
 
 class Run:
@@ -28,12 +29,18 @@ class Run:
         self.row.update(driver=graph.robot.name, fault=fault.name, form=form, run=number, seed=seed, expected=fault.expected,
                         limit=fault.limit)
         self.problems = []
+        self.goal = None       # its handle, when it has been sent
         self.result = None     # of the goal
         self.start_off = 0.0   # how far from its goal the robot begins [m]
         self.begin = 0.0       # when the fault does [s]
 
+    def cancel(self):
+        if self.goal is not None and not self.ended():
+            self.goal.cancel()
+            self.wait(PATIENCE, self.ended)
+
     def ended(self):
-        return self.graph.client is None or self.graph.client.simple_state == SimpleGoalState.DONE  # the result has come, too
+        return self.goal is None or self.goal.get_comm_state() in (CommState.DONE, CommState.LOST)
 
     def wait(self, seconds, holds=lambda: False):
         end = time.monotonic() + seconds
@@ -64,9 +71,8 @@ class Run:
         for heard in (graph.commands, graph.statuses, graph.truths):
             heard.clear()
         self.start_off = graph.off()[0]
-        graph.client.send_goal(graph.robot.goal(TIMEOUT))
+        self.goal = graph.client.send_goal(graph.robot.goal(TIMEOUT))
         if not self.wait_for_the_moment():
-            graph.client.cancel_goal()
             return None
         truths_before = list(graph.truths)
         begin = self.begin = self.fault.begin(graph, self.draw)
@@ -116,7 +122,11 @@ class Run:
         zero = 0.0 if last is None else last - begin
         stopping = self.fault.expected == faults.STOPS
         self.row["zero"] = "%.3f" % zero
-        if stopping and zero > self.fault.limit:
+        load = os.getloadavg()[0]  # within the last minute
+        if load > 2.0 * os.cpu_count():
+            self.row["limit"] = max(self.fault.limit, faults.BUSY_LIMIT)
+        self.row["load"] = "%.1f" % load
+        if stopping and zero > self.row["limit"]:
             self.problems.append("moves %.2f s after the fault" % zero)
         reasons = [status.reason for moment, status in list(self.graph.statuses) if begin <= moment <= end]
         self.row["standing"] = reasons[-1] if reasons else ""
@@ -134,9 +144,8 @@ class Run:
             self.problems.append("%s ends with status %d after SIGINT" % (name, status))
 
     def take_result(self):
-        """None: there is none, or the driver that it would have come from has been started anew."""
-        client = self.graph.client
-        return client.get_result() if client is not None and self.ended() else None
+        """None: there is none."""
+        return self.goal.get_result() if self.goal is not None and self.ended() else None
 
     def judge_end(self):
         result = self.result or self.take_result()
@@ -146,8 +155,7 @@ class Run:
         self.row["reason"] = result.message if result is not None else ""
         if result is None and not dead:
             self.problems.append("the goal does not end")
-            if self.graph.client is not None:
-                self.graph.client.cancel_goal()
+            self.cancel()
         if result is not None and not result.message:
             self.problems.append("it ends without a reason")
         if any(not status.reason for _, status in list(self.graph.statuses)):

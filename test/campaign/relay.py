@@ -351,7 +351,15 @@ def publish_as_second(source, target):
     rospy.init_node("second_publisher", anonymous=True)
     message = next(kind for robot in robots.ROBOTS.values() for _, taken, kind in robot.inputs.values() if taken == source)
     publisher = rospy.Publisher(target, message, queue_size=50)
-    rospy.Subscriber(source, message, lambda one: publisher.publish(of_another_source(one)), queue_size=5, buff_size=2 ** 23)
+
+    def publish(one):
+        try:
+            publisher.publish(of_another_source(one))
+        except rospy.ROSException:
+            if not rospy.is_shutdown():
+                raise
+
+    rospy.Subscriber(source, message, publish, queue_size=5, buff_size=2 ** 23)
     rospy.spin()
 
 

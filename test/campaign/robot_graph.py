@@ -105,7 +105,7 @@ class RobotGraph:
 
         graph.wait_until("all nodes", there)
         if self.client is None:
-            self.client = actionlib.SimpleActionClient(self.robot.action, self.robot.action_type)
+            self.client = actionlib.ActionClient(self.robot.action, self.robot.action_type)
         graph.wait_until("the action", lambda: self.client.wait_for_server(rospy.Duration(0.1)))
         end = time.monotonic() + 20.0
         while time.monotonic() < end:

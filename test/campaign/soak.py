@@ -11,6 +11,7 @@ import argparse
 import csv
 import os
 import random
+import signal
 import subprocess
 import sys
 import time
@@ -65,7 +66,7 @@ def work(options):
     """One robot's goals, in a process of its own: rospy knows one master only."""
     import robot_graph
     import robots
-    import rospy
+    from actionlib import CommState
     robot = robots.ROBOTS[options.worker]
     robot.rate = min(robot.rate, 8)
     draw = random.Random("%s %d" % (robot.name, options.seed))
@@ -91,12 +92,13 @@ def work(options):
         try:
             while time.monotonic() < begin + 3600.0 * options.hours:
                 graph.place(robot.start_pose(draw))
-                graph.client.send_goal(robot.goal(TIMEOUT))
-                while not graph.client.wait_for_result(rospy.Duration(0.2)):
+                goal = graph.client.send_goal(robot.goal(TIMEOUT))
+                while goal.get_comm_state() != CommState.DONE:
+                    time.sleep(0.1)
                     if time.monotonic() > due:
                         due += period
                         sample()
-                result = graph.client.get_result()
+                result = goal.get_result()
                 goals += 1
                 arrived += int(result.success)
                 if not result.success:
@@ -196,4 +198,6 @@ def main():
 
 
 if __name__ == "__main__":
+    # Ctrl-C ends it as it does elsewhere also where a shell has started it in the background.
+    signal.signal(signal.SIGINT, signal.default_int_handler)
     sys.exit(main())
