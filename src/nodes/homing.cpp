@@ -14,14 +14,39 @@
 #include <algorithm>
 #include <chrono>
 #include <cmath>
+#include <cstddef>
 #include <memory>
 #include <optional>
 #include <stdexcept>
 #include <string>
 #include <utility>
+#include <vector>
 
 namespace view_servo
 {
+namespace
+{
+/** A goal's views in the order of driving. */
+struct HomingStages
+{
+  std::vector<std::shared_ptr<HomingTask>> tasks;
+  std::size_t at = 0;  // the one that the base is driven to
+
+  bool atLast() const
+  {
+    return at + 1 == tasks.size();
+  }
+  /** Which of several views this is about, to begin a line with; empty when there is one only. */
+  std::string where() const
+  {
+    return tasks.size() == 1 ? ""
+                             : "view '" + tasks[at]->view + "', " + std::to_string(at + 1) + " of " +
+                                   std::to_string(tasks.size()) + ": ";
+  }
+};
+
+}  // namespace
+
 /**
  * Drives a mobile base back to where a view was stored. Private parameters: see HomingDriverParams.
  *
@@ -38,7 +63,8 @@ namespace view_servo
  *  - `heading` (view_servo/Heading): for each image; `heading_arrow` (geometry_msgs/PoseStamped): the same for rviz, at
  *    the base, its x axis towards the view, while there is a heading. `view_pose` (geometry_msgs/PoseWithCovarianceStamped);
  *  - `~markers` (visualization_msgs/MarkerArray): see ViewHoming.
- * Action: `home` (view_servo/HomeToView).
+ * Action: `home` (view_servo/HomeToView). All views of a goal are read before anything moves. Between two of them the base
+ * stands until a matcher has found the next one.
  *
  * A thread of the driver's own works on images and matches, and leaves a Course; every cycle of control follows it by the
  * newest odometry, also while an image is worked on.
@@ -49,7 +75,7 @@ public:
   using Action = HomeToViewAction;
   using Velocity = BaseVelocity;
   using Limiter = BaseVelocityLimiter;
-  using Task = std::shared_ptr<HomingTask>;
+  using Task = HomingStages;
   using Params = HomingDriverParams;
   static constexpr const char* ACTION = "home";
 
@@ -60,7 +86,7 @@ public:
       homing_(context, params_,
               { [this] { forgetOverdueLesson(); },
                 {},
-                {},
+                [this] { goOnAfterArrival(); },
                 [this](const HomingOutcome& outcome) {
                   if (storeStructure(homing_.viewStore(), outcome))
                   {
@@ -83,32 +109,37 @@ public:
     {
       throw std::invalid_argument("timeout and step must be finite and not negative");
     }
-    const std::string view = goal.view.empty() ? params_.view : goal.view;
-    if (view.empty())
+    std::vector<LearntView> stored;
+    for (const std::string& view : viewsOf(goal))
     {
-      throw std::invalid_argument("the goal names no view, and ~view is not set");
+      stored.push_back(loadLearntView(homing_.viewStore(), view));
     }
-    const LearntView stored = loadLearntView(homing_.viewStore(), view);
-    const CameraFrame frame = homing_.waitForInputs(view);
+    const CameraFrame frame = homing_.waitForInputs(stored.front().view.name);
     HomingParams homing = params_.homing;
     if (goal.step > 0.0)
     {
       homing.step = goal.step;
       homing.near_step = std::min(homing.near_step, goal.step);
     }
-    auto task = std::make_unique<Task>(homing_.makeTask(stored, frame, homing));
+    auto stages = std::make_unique<Task>();
+    for (const LearntView& view : stored)
+    {
+      stages->tasks.push_back(homing_.makeTask(view, frame, homing));
+    }
     homing_.waitForAnswer();
-    return task;
+    return stages;
   }
 
-  void begin(std::unique_ptr<Task> task)
+  void begin(std::unique_ptr<Task> stages)
   {
-    homing_.setTask(*task);
+    stages_ = std::move(stages);
+    homing_.setTask(stages_->tasks.front());
     homing_.restartWay();
   }
 
   void end()
   {
+    stages_.reset();
     homing_.setTask(nullptr);
     homing_.expectView(idle_view_.name(), "");
   }
@@ -122,7 +153,9 @@ public:
 
   Progress progress() const
   {
-    return toProgress(homing_.report());
+    Progress progress = toProgress(homing_.report());
+    progress.reason = stages_->where() + progress.reason;
+    return progress;
   }
   Velocity wanted(double /*time*/) const
   {
@@ -159,12 +192,19 @@ public:
   {
     result.final = toHeading(homing_.report(), homing_.baseFrame());
     result.travelled = homing_.task() ? homing_.travelled() : 0.0;
+    if (stages_)
+    {
+      result.reached = static_cast<int>(stages_->at) + (homing_.report().state == HomingState::ARRIVED ? 1 : 0);
+    }
   }
 
   void fill(HomeToViewFeedback& feedback, const ServoStatus& /*status*/) const
   {
     feedback.heading = toHeading(homing_.report(), homing_.baseFrame());
     feedback.manoeuvre = homing_.report().manoeuvre;
+    feedback.view = stages_->tasks[stages_->at]->view;
+    feedback.number = static_cast<int>(stages_->at) + 1;
+    feedback.count = static_cast<int>(stages_->tasks.size());
   }
 
   void diagnose(diagnostic_updater::DiagnosticStatusWrapper& status) const
@@ -174,6 +214,39 @@ public:
 
 private:
   using Clock = std::chrono::steady_clock;
+
+  /** Names of the goal's views. @throws std::invalid_argument. */
+  std::vector<std::string> viewsOf(const HomeToViewGoal& goal) const
+  {
+    if (!goal.views.empty() && !goal.view.empty())
+    {
+      throw std::invalid_argument("the goal has both a view and a list of views: leave one of them empty");
+    }
+    std::vector<std::string> views = goal.views;
+    if (views.empty())
+    {
+      views.push_back(goal.view.empty() ? params_.view : goal.view);
+    }
+    if (views.front().empty() && goal.views.empty())
+    {
+      throw std::invalid_argument("the goal names no view, and ~view is not set");
+    }
+    return views;
+  }
+
+  /** The base is at a view that is not the last: the next one is wanted. It stands until there is a way to that. */
+  void goOnAfterArrival()
+  {
+    if (!stages_ || stages_->atLast() || homing_.report().state != HomingState::ARRIVED)
+    {
+      return;
+    }
+    ROS_INFO_STREAM(stages_->where() << homing_.report().reason);
+    const std::shared_ptr<HomingTask>& next = stages_->tasks[++stages_->at];
+    homing_.expectView(next->view, context_.goalId());
+    context_.requestNextView(next->view);
+    homing_.setTask(next);
+  }
 
   /** From now on a view is followed without a goal until it is learnt; empty: the one of the parameters again. */
   void learn(const std::string& view)
@@ -239,7 +312,8 @@ private:
   DriverContext& context_;
   const Params params_;
   IdleView idle_view_;
-  Clock::time_point next_watch_;  // the worker's thread's alone
+  std::unique_ptr<HomingStages> stages_;  // of the goal that runs
+  Clock::time_point next_watch_;          // the worker's thread's alone
   ViewHoming homing_;
 };
 

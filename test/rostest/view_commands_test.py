@@ -299,8 +299,11 @@ class ViewCommands(graph.GraphTest):
                          ("", [("above", 0.01, 0.05), ("shelf", 0.0, 0.0)]))
         self.view("go shelf servo:=arm1/servo --driver servo_25d")
         self.assertEqual((self.arm.goals[-1].view, self.arm.goals[-1].views), ("shelf", []))
-        self.end(self.begin("go", "above", "dock", "--driver", "homing"), CANNOT, "drives to one view, and 2 are named")
+        approach = self.begin("go", "hall", "dock", "--driver", "homing", "--approach", "0.01", "0.05")
+        self.end(approach, CANNOT, "takes no tolerances with a goal")
         self.assertEqual(self.homing.goals, [])
+        self.view("go hall dock --driver homing")
+        self.assertEqual((self.homing.goals[-1].view, self.homing.goals[-1].views), ("", ["hall", "dock"]))
 
     def test_stop(self):
         self.homing.behaviour = self.arm.behaviour = "drive"
