@@ -595,7 +595,7 @@ def draw_arm(run, name):
 
 
 # The kinds of runs: what reads one from a bag, giving None when it is not in there, and what draws it.
-KINDS = [(read_homing, draw_homing), (read_arm, draw_arm)]
+KINDS = ((read_homing, draw_homing), (read_arm, draw_arm))
 
 
 def read_bag(path, read):
@@ -613,18 +613,18 @@ def read_bag(path, read):
         raise BadInput(f"{path}: not a bag that can be read: {type(error).__name__}: {error}") from error
 
 
-def read_run(bag):
+def read_run(bag, kinds=KINDS):
     """The run in an open bag, and what draws it; None when there is none."""
-    for read, draw in KINDS:
+    for read, draw in kinds:
         run = read(bag)
         if run is not None:
             return run, draw
     return None
 
 
-def load(path):
+def load(path, kinds=KINDS):
     """The run in a bag, and what draws it."""
-    found = read_bag(path, read_run)
+    found = read_bag(path, lambda bag: read_run(bag, kinds))
     if found is None:
         raise BadInput(f"{path}: there are no view_servo/Heading messages on a topic called heading, "
                        "and no view_servo/ServoError messages on one called servo_error")
