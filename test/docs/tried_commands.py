@@ -31,6 +31,7 @@ NOT_RUN = {
     "scripts/demo": "it is this test's big brother, and takes minutes",
     "scripts/demo arm": "likewise",
     "scripts/demo match": "likewise",
+    "scripts/demo route": "likewise",
     "scripts/test": "it runs this test",
     "scripts/install_dependencies": "it may change the machine",
     "scripts/build": "it has been run, else there would be nothing to test",
