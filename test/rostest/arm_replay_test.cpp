@@ -231,7 +231,16 @@ JudgedCommands judgeCommands(const std::deque<geometry_msgs::TwistStamped>& twis
   return judged;
 }
 
-TEST(ArmReplay, HomographiesAndTwistsAgreeWithTheTruth)
+class ArmReplay : public ::testing::Test
+{
+protected:
+  void TearDown() override
+  {
+    removeViews("servo_25d");
+  }
+};
+
+TEST_F(ArmReplay, HomographiesAndTwistsAgreeWithTheTruth)
 {
   constexpr double LEAST_ANSWERED = 0.6;  // of the images; a busy machine leaves some out
   constexpr double RAMP = 0.6;            // until a limited command has the direction of the one wanted [s]

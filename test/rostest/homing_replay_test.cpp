@@ -34,6 +34,11 @@ PlanarPose planarPoseOf(const Eigen::Isometry3d& camera)
 
 class HomingReplayTest : public ::testing::TestWithParam<const char*>
 {
+protected:
+  void TearDown() override
+  {
+    removeViews("homing");
+  }
 };
 
 TEST_P(HomingReplayTest, HeadingsAndArrivalAgreeWithTheTruth)

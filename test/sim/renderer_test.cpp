@@ -262,7 +262,7 @@ TEST(SimulatedCamera, FarTexturesDoNotAlias)
 TEST(SimulatedCamera, DrawsBesideOthersOfItsSizeInOtherThreadsAsAlone)
 {
   constexpr std::size_t CAMERAS = 4;
-  constexpr int PICTURES = 25;
+  constexpr int PICTURES = 8;
   const World world = checkerWorld();
   Rng rng(11);
   std::vector<Eigen::Isometry3d> views;
