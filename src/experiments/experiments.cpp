@@ -18,6 +18,7 @@
 #include "experiments/hypothesis_experiments.h"
 #include "experiments/line_ground_truth.h"
 #include "experiments/lines_table.h"
+#include "experiments/mount_experiment.h"
 #include "experiments/profile_experiments.h"
 #include "experiments/recognition_experiment.h"
 #include "experiments/robot_programs.h"
@@ -97,6 +98,7 @@ const std::vector<Experiment>& experiments()
       runHandEyeExperiment },
     { "hand_eye_real", "the same of a real arm, beside a calibration with a board of known size", true, std::nullopt,
       runHandEyeRealExperiment },
+    { "mount", "where the camera is on a simulated base, by a stored view", false, MOUNT_RUNS, runMountExperiment },
     { "cyclic_order", "figures 7.5 to 7.11: cyclic order against plain votes", false, DRAWN_PICTURES,
       runCyclicOrderExperiment },
     { "campaign", "faults at random moments of simulated runs, by nodes", false, CAMPAIGN_RUNS, nullptr,

@@ -62,7 +62,7 @@ TEST(Experiments, RefusesRunsWhereNothingIsRepeated)
     expectContains(outcome.err,
                    "homing, homing_differential, homing_structure, routes, arm, multi_hypothesis, real_pairs, "
                    "profiles_parameters, "
-                   "view_consistency, rooms, false_answers, recognition, hand_eye, cyclic_order, campaign do");
+                   "view_consistency, rooms, false_answers, recognition, hand_eye, mount, cyclic_order, campaign do");
   }
 }
 
