@@ -151,6 +151,8 @@ class Busy(Fault):
     def begin(self, robot_graph, draw):
         self._processes = [subprocess.Popen(["sh", "-c", "while :; do :; done"], preexec_fn=graph.end_with_parent)
                            for _ in range(2 * os.cpu_count())]
+        for process in self._processes:
+            robot_graph.usual_priority(process)
         if not self._input:
             return relay.now()
         time.sleep(0.5)
