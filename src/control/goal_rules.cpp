@@ -52,7 +52,9 @@ Verdict judge(const Circumstances& circumstances, const Progress& progress)
   if (progress.state == Progress::FAILED)
   {
     const std::string& missing = circumstances.missing_input;
-    return { Verdict::ABORT, reasonOf(progress) + (missing.empty() ? "" : ": " + missing) };
+    const std::string reason = reasonOf(progress);
+    const bool is_said = reason.find(missing) != std::string::npos;  // also when nothing is missing
+    return { Verdict::ABORT, is_said ? reason : reason + ": " + missing };
   }
   if (!(circumstances.elapsed <= circumstances.timeout))
   {

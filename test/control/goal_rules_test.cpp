@@ -56,6 +56,7 @@ std::vector<Row> table()
     { "failed", nothing, Progress::FAILED, "gone", Verdict::ABORT, "gone" },
     { "failed without a word", nothing, Progress::FAILED, "", Verdict::ABORT, "nothing is known yet" },
     { "failed while silent", silent(0.5), Progress::FAILED, "gone", Verdict::ABORT, "gone: no image" },
+    { "failed as it was silent", silent(0.5), Progress::FAILED, "lost: no image", Verdict::ABORT, "lost: no image" },
     // What ends it whatever it has come to.
     { "ending", [](Circumstances& c) { c.shutting_down = true; }, Progress::DRIVING, "drives", Verdict::ABORT,
       "the node is shutting down" },
