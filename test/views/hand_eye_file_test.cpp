@@ -8,6 +8,7 @@
 
 #include <gtest/gtest.h>
 
+#include <cmath>
 #include <cstddef>
 #include <filesystem>
 #include <stdexcept>
@@ -153,6 +154,16 @@ TEST_F(HandEyePosesFileTest, ReadsWhatItHasWritten)
     EXPECT_TRUE(read.poses[i].flange_in_base.isApprox(written.poses[i].flange_in_base, 1e-14));
     EXPECT_TRUE(read.poses[i].h.isApprox(written.poses[i].h, 1e-15));
   }
+}
+
+TEST_F(HandEyePosesFileTest, KeepsTheHeightOfTheCameraOfABase)
+{
+  HandEyePosesFile written = poses();
+  writeHandEyePosesFile(written, path_);
+  EXPECT_TRUE(std::isnan(readHandEyePosesFile(path_).camera_height));
+  written.camera_height = 0.4125;
+  writeHandEyePosesFile(written, path_);
+  EXPECT_EQ(readHandEyePosesFile(path_).camera_height, 0.4125);
 }
 
 TEST_F(HandEyePosesFileTest, NamesWhatIsWrong)
