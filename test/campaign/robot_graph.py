@@ -48,13 +48,20 @@ class RobotGraph:
     def __init__(self, robot, clock=False, small_disk=False):
         set_priority(0, -10)  # what the relay delays is no fault of the nodes'
         self.robot = robot
+        self.graph, self.processes, self.specs = None, {}, {}
         self.directory = tempfile.mkdtemp(prefix="view_servo_campaign_")
         self.small_disk = small_disk and self._mount()
+        try:
+            self._begin(robot, clock)
+        except BaseException:
+            self.stop()
+            raise
+
+    def _begin(self, robot, clock):
         self.graph = graph.Graph(self.directory)
         os.environ.update(ROS_MASTER_URI=self.graph.uri, ROS_HOSTNAME="localhost")
         rospy.init_node("campaign", disable_signals=True)
         self.by_stamps = not clock  # whether stamps of commands are wall time
-        self.processes, self.specs = {}, {}
         self.commands, self.statuses, self.truths = [], [], []
         self.truth = self.goal_truth = None
         self._subscribers = [
@@ -163,7 +170,8 @@ class RobotGraph:
         for process in self.processes.values():
             if process.poll() is None:
                 process.send_signal(signal.SIGCONT)
-        self.graph.stop()
+        if self.graph is not None:
+            self.graph.stop()
         if self.small_disk:
             subprocess.call(["umount", "--lazy", self.directory])
         shutil.rmtree(self.directory, ignore_errors=True)
