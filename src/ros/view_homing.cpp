@@ -201,6 +201,16 @@ void ViewHoming::endIfTimeWentBack(const DriverInput& input)
   }
 }
 
+void ViewHoming::endIfStampsAreApart()
+{
+  // Odometry that has ceased is missing, whatever its last stamp was.
+  const std::string apart = odometry_.input().fresh() ? stampsApart(odometry_.input(), images_) : "";
+  if (odd_stamps_ >= ODD_STAMPS && !apart.empty())
+  {
+    context_.abort(apart);
+  }
+}
+
 void ViewHoming::onFrame(const CameraFrame& frame)
 {
   const DriverInput::Stamp place = images_.checkStamp(frame.image->header.stamp);
@@ -216,13 +226,8 @@ void ViewHoming::onFrame(const CameraFrame& frame)
     context_.abort("the camera's calibration has changed");
     setTask(nullptr);
   }
-  // Odometry that has ceased is missing, whatever its last stamp was.
-  const std::string apart = odometry_.input().fresh() ? stampsApart(odometry_.input(), images_) : "";
-  odd_stamps_ = apart.empty() ? 0 : odd_stamps_ + 1;
-  if (odd_stamps_ >= ODD_STAMPS)
-  {
-    context_.abort(apart);
-  }
+  odd_stamps_ = stampsApart(odometry_.input(), images_).empty() ? 0 : odd_stamps_ + 1;
+  endIfStampsAreApart();
   worker_.addFrame(frame);
 }
 
@@ -234,6 +239,7 @@ void ViewHoming::onOdometry(const nav_msgs::Odometry& message)
   {
     return;
   }
+  endIfStampsAreApart();
   worker_.addOdometry(reading->time, reading->pose);
   if (reading->place == DriverInput::Stamp::NEWEST)
   {

@@ -331,9 +331,23 @@ TEST_F(HomingNodeTest, WaitsForOdometryThatIsGoneForLongerThanStampsMayBeApart)
   const Clock::time_point begin = Clock::now();
   EXPECT_TRUE(waitUntil([&] { return Clock::now() - begin > LONG; }));
   EXPECT_FALSE(client_.getState().isDone()) << reason();
-  EXPECT_NE(reason().find("no odometry"), std::string::npos) << reason();
+  EXPECT_EQ(reason().find("apart"), std::string::npos) << reason();
   robot_.moves_odometry = true;
   expectToGoOn();
+}
+
+TEST_F(HomingNodeTest, DoesNotDriveByOdometryThatComesBackLate)
+{
+  constexpr std::chrono::milliseconds LONG(1200);
+  drive();
+  expectToStop([this] { robot_.moves_odometry = false; }, ServoStatus::LOST, "no odometry");
+  const Clock::time_point begin = Clock::now();
+  EXPECT_TRUE(waitUntil([&] { return Clock::now() - begin > LONG; }));
+  robot_.odometry_offset = -0.9;
+  const Clock::time_point moment = Clock::now();
+  expectToEnd([this] { robot_.moves_odometry = true; }, GoalState::ABORTED, "before the images on");
+  EXPECT_LT(commands_.lastMotionAfter(moment), 0.0);
+  robot_.odometry_offset = 0.0;
 }
 
 TEST_F(HomingNodeTest, RefusesAndStopsForOdometryOfAnotherTime)

@@ -152,6 +152,7 @@ private:
   std::string odometryLacks() const;
   void needMatches(bool needed);
   void endIfTimeWentBack(const DriverInput& input);
+  void endIfStampsAreApart();
   void onFrame(const CameraFrame& frame);
   void onOdometry(const nav_msgs::Odometry& message);
   void onMatches(bool wanted, const std_msgs::Header& header, const std::vector<PointMatch>& matches);
