@@ -3,9 +3,9 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """
 Homing, arm and route goals without end in both simulators, a third of the time each: soak.py [--hours H] [--seed N]
-[--out DIR] [--short]. Memory, descriptors and threads of each node and the latency of each driver are sampled; DIR/soak.csv has a row a sample. A line is
-fitted to each. Exit status: 0 nothing grows and every goal arrives, 1 something grows or a goal does not arrive, 2 bad
-input.
+[--out DIR] [--short]. Memory, descriptors and threads of each node and the latency of each driver are sampled; DIR/soak.csv
+has a row a sample. A line is fitted to each. Exit status: 0 nothing grows and every goal arrives, 1 something grows or a
+goal does not arrive, 2 bad input.
 """
 import argparse
 import csv
