@@ -21,6 +21,14 @@ std::string inWords(const PlanarPose& motion)
 
 void MotionWatch::advance(double time)
 {
+  constexpr double LONGEST = 0.5;  // between two calls [s]
+  // A clock that was set, or calls that ceased: nothing is known of the motion meanwhile.
+  if (!(std::abs(time - time_) <= LONGEST))
+  {
+    moments_.clear();
+    time_ = time;
+    return;
+  }
   const BaseVelocity step = (time - time_) * command_;
   by_command_ = compose(by_command_, { step.x(), step.y(), step.z() });
   time_ = time;

@@ -71,5 +71,28 @@ TEST(MotionWatch, BeginsAnewWhenTheBaseIsToldToStand)
   }
 }
 
+TEST(MotionWatch, SaysNothingOfATimeInWhichTheClockWasSet)
+{
+  MotionWatch watch;
+  PlanarPose base;
+  double clock = 0.0;
+  for (int i = 0; i < 100; ++i)
+  {
+    clock += i == 50 ? 5.0 : 0.05;  // [s]
+    base.x += 0.2 * 0.05;
+    watch.addCommand(clock, BaseVelocity(0.2, 0.0, 0.0));
+    EXPECT_EQ(watch.addOdometry(clock, base), "") << i;
+  }
+  // Afterwards it watches as before.
+  std::string said;
+  for (int i = 0; i < 60; ++i)
+  {
+    clock += 0.05;
+    watch.addCommand(clock, BaseVelocity(0.2, 0.0, 0.0));
+    said += watch.addOdometry(clock, base);
+  }
+  EXPECT_NE(said.find("the base does not do what it is told"), std::string::npos);
+}
+
 }  // namespace
 }  // namespace view_servo
