@@ -41,6 +41,7 @@ void becomeRobotProgram(const std::string& script, const RobotProgramOptions& op
     words.emplace_back("--short");
   }
   std::vector<char*> arguments;
+  arguments.reserve(words.size() + 1);
   for (std::string& word : words)
   {
     arguments.push_back(word.data());

@@ -205,6 +205,7 @@ MountResult calibrateMount(const HandEyeView& view, const std::vector<HandEyePos
   }
 
   std::vector<PlanarPose> odometry;
+  odometry.reserve(poses.size());
   for (const HandEyePose& pose : poses)
   {
     odometry.push_back(toPlanar(pose.flange_in_base));

@@ -447,7 +447,7 @@ std::string refine(const Problem& problem, const std::vector<PlanarPose>& odomet
       selection.poses.erase(std::find(selection.poses.begin(), selection.poses.end(), now.front()));
       continue;
     }
-    if (const std::string fault = contradiction(selection, problem.size()); !fault.empty())
+    if (std::string fault = contradiction(selection, problem.size()); !fault.empty())
     {
       return fault;
     }
