@@ -102,6 +102,14 @@ HandEyeMotion motionOf(const Problem& problem, const std::vector<HandEyePose>& p
   return motionOf(problem, poses, normals.empty() ? Eigen::Vector3d(Eigen::Vector3d::Constant(NONE)) : normals.front());
 }
 
+std::string lackOfTravel(double travel, double least)
+{
+  return (std::isfinite(travel)
+              ? "the camera moved by " + rounded(100.0 * travel, 0) + " % of its distance from the plane"
+              : std::string("the images do not show that the camera moved")) +
+         ": move it by " + rounded(100.0 * least, 0) + " % or more";
+}
+
 std::string rounded(double value, int decimals)
 {
   char text[32];
@@ -146,10 +154,7 @@ std::vector<std::string> missingMotion(const HandEyeMotion& motion, const HandEy
   }
   if (!(motion.travel >= params.min_travel))
   {
-    lines.push_back((std::isfinite(motion.travel) ? "the camera moved by " + rounded(100.0 * motion.travel, 0) +
-                                                        " % of its distance from the plane"
-                                                  : std::string("the images do not show that the camera moved")) +
-                    ": move it by " + rounded(100.0 * params.min_travel, 0) + " % or more");
+    lines.push_back(lackOfTravel(motion.travel, params.min_travel));
   }
   return lines;
 }

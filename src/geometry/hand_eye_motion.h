@@ -20,6 +20,9 @@ HandEyeMotion motionOf(const Problem& problem, const std::vector<HandEyePose>& p
 /** The same with the normal on which most homographies agree. */
 HandEyeMotion motionOf(const Problem& problem, const std::vector<HandEyePose>& poses);
 
+/** What to do about too short a way of the camera. @param travel as a part of the plane's distance; NaN: not known. */
+std::string lackOfTravel(double travel, double least);
+
 /** A number with this many digits after the point, as people read it. */
 std::string rounded(double value, int decimals = 1);
 

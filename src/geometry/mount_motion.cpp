@@ -85,10 +85,7 @@ std::vector<std::string> missingMotion(const MountMotion& motion, const MountPar
   }
   if (!(motion.travel >= params.min_travel))
   {
-    lines.push_back((std::isfinite(motion.travel) ? "the camera moved by " + rounded(100.0 * motion.travel, 0) +
-                                                        " % of its distance from the plane"
-                                                  : std::string("the images do not show that the camera moved")) +
-                    ": move it by " + rounded(100.0 * params.min_travel, 0) + " % or more");
+    lines.push_back(hand_eye::lackOfTravel(motion.travel, params.min_travel));
   }
   return lines;
 }

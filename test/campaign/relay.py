@@ -244,7 +244,9 @@ class Second(Fault):
         self._process = subprocess.Popen([sys.executable, os.path.abspath(__file__), channel.source, channel.target],
                                          stdout=subprocess.DEVNULL)
         end = time.monotonic() + 20.0
-        while channel.publishers() < 2 and time.monotonic() < end:
+        while channel.publishers() < 2:
+            if time.monotonic() > end:
+                raise AssertionError("nobody else publishes '%s' after 20 s" % channel.target)
             time.sleep(0.02)
 
     def passes(self, channel, message):

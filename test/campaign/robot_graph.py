@@ -138,13 +138,18 @@ class RobotGraph:
                 time.sleep(0.1)
         raise AssertionError("%s is not enabled" % self.robot.driver)
 
+    def address(self, name):
+        """Where the master has a node; empty: it knows none of that name."""
+        code, _, address = self.graph.master.lookupNode("/campaign", "/" + name)
+        return address if code == 1 else ""
+
     def restore(self):
         """Starts what has ended. @return the names."""
         ended = [name for name, process in self.processes.items() if process.poll() is not None]
+        before = {name: self.address(name) for name in ended}  # the master still knows who was killed
         for name in ended:
             self.start(name)
-        if ended:
-            time.sleep(0.5)
+        graph.wait_until("new nodes", lambda: all(self.address(name) not in ("", before[name]) for name in ended))
         self.wait_for_nodes()
         return ended
 
