@@ -6,9 +6,7 @@
 
 #include <cstdio>
 #include <ctime>
-#include <filesystem>
 #include <iostream>
-#include <stdexcept>
 
 namespace view_servo
 {
@@ -72,14 +70,6 @@ std::string numbersOf(const Eigen::Isometry3d& pose)
   const Eigen::Vector3d place = pose.translation();
   const Eigen::Quaterniond turn(pose.linear());
   return fixed({ place.x(), place.y(), place.z() }, 6) + " " + fixed({ turn.x(), turn.y(), turn.z(), turn.w() }, 8);
-}
-
-void refuseToReplace(const std::string& path, const std::string& option, bool overwrite)
-{
-  if (!overwrite && !path.empty() && std::filesystem::exists(path))
-  {
-    throw std::runtime_error("'" + path + "' exists: say --overwrite, or another file by " + option);
-  }
 }
 
 }  // namespace view_servo

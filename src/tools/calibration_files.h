@@ -35,7 +35,4 @@ std::vector<double> numbersOf(const Eigen::Matrix<double, 6, 6>& covariance);
 /** x y z qx qy qz qw, as static_transform_publisher takes them. */
 std::string numbersOf(const Eigen::Isometry3d& pose);
 
-/** @throws std::runtime_error when a file exists that is not to be replaced. @param option that names it. */
-void refuseToReplace(const std::string& path, const std::string& option, bool overwrite);
-
 }  // namespace view_servo

@@ -4,12 +4,11 @@
 #include "check_ros/robot_check.h"
 #include "check_ros/test_drive.h"
 #include "tools/check_robot_options.h"
-#include "tools/command_line.h"
+#include "tools/ros_program.h"
 #include "view_servo/parameters/error_text.h"
 #include "view_servo/ros/control_node.h"
 
 #include <poll.h>
-#include <ros/console.h>
 #include <ros/init.h>
 #include <ros/master.h>
 #include <ros/spinner.h>
@@ -226,10 +225,7 @@ int main(int argc, char** argv)
       pointers.push_back(&word[0]);
     }
     int count = static_cast<int>(pointers.size());
-    ros::init(count, pointers.data(), "check_robot",
-              ros::init_options::NoSigintHandler | ros::init_options::AnonymousName);
-    ros::console::set_logger_level(ROSCONSOLE_DEFAULT_NAME, ros::console::levels::Fatal);
-    ros::console::notifyLoggerLevelsChanged();
+    initQuietly(count, pointers.data(), "check_robot", ros::init_options::NoSigintHandler);
     const ExitDeadline exit_deadline(&detail::shutdownRequested);
     return run(*options);
   }

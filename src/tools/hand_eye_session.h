@@ -13,7 +13,6 @@
 
 #include <chrono>
 #include <deque>
-#include <filesystem>
 #include <functional>
 #include <mutex>
 #include <optional>
@@ -25,13 +24,13 @@ namespace view_servo
 /** Where calibrate_hand_eye and calibrate_mount find what they need. */
 struct HandEyeSources
 {
-  std::string view;                 ///< name of the stored view
-  std::filesystem::path views_dir;  ///< where it is stored; empty: as viewsDir() says
-  std::string base_frame;           ///< of the arm; of odometry for a mobile base
-  std::string flange_frame;         ///< of what the camera is mounted on
-  std::string camera;               ///< namespace of camera_info
-  std::string tracker;              ///< node homography_tracker
-  bool on_base = false;             ///< the camera is on a mobile base
+  std::string view;          ///< name of the stored view
+  std::string views_dir;     ///< directory where it is stored; empty: as viewsDir() says
+  std::string base_frame;    ///< of the arm; of odometry for a mobile base
+  std::string flange_frame;  ///< of what the camera is mounted on
+  std::string camera;        ///< namespace of camera_info
+  std::string tracker;       ///< node homography_tracker
+  bool on_base = false;      ///< the camera is on a mobile base
 
   /** The options that name both frames. */
   std::string frameOptions() const

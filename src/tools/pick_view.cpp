@@ -1,19 +1,18 @@
 // Copyright (c) 2026, the view_servo authors
 // SPDX-License-Identifier: BSD-3-Clause
-#include "tools/command_line.h"
 #include "tools/region_judgement.h"
 #include "tools/region_picker.h"
+#include "tools/ros_program.h"
 #include "view_servo/SaveView.h"
 #include "view_servo/parameters/error_text.h"
 #include "view_servo/parameters/seconds_since.h"
 #include "view_servo/ros/call_service.h"
 #include "view_servo/ros/conversions.h"
+#include "view_servo/ros/readiness.h"
 
 #include <cv_bridge/cv_bridge.h>
 #include <image_transport/image_transport.h>
-#include <ros/console.h>
 #include <ros/init.h>
-#include <ros/master.h>
 #include <ros/node_handle.h>
 #include <ros/service.h>
 #include <ros/spinner.h>
@@ -395,29 +394,27 @@ private:
 
 int run(const std::string& view, bool overwrite)
 {
-  if (!ros::master::check())
-  {
-    throw Problem("there is no ROS master at " + ros::master::getURI() +
-                  ": start a launch file, or set ROS_MASTER_URI");
-  }
+  requireMaster();
   const LiveImage camera(ros::names::resolve("camera") + "/image_raw");
   ros::AsyncSpinner spinner(1);
   spinner.start();
-  const Clock::time_point begin = Clock::now();
-  while (camera.latest().first.empty())
+  const std::string missing = waitUntilReady(IMAGE_PATIENCE, [&]() -> std::string {
+    if (!camera.latest().first.empty())
+    {
+      return "";
+    }
+    const std::string problem = camera.problem();
+    return (problem.empty() ? "no image has come on '" + camera.topic() + "'"
+                            : "images on '" + camera.topic() + "' cannot be shown: " + problem) +
+           "; camera:=NAMESPACE names another camera";
+  });
+  if (!ros::ok())
   {
-    if (!ros::ok())
-    {
-      return NOT_STORED;
-    }
-    if (secondsSince(begin) > IMAGE_PATIENCE)
-    {
-      const std::string problem = camera.problem();
-      throw Problem((problem.empty() ? "no image has come on '" + camera.topic() + "'"
-                                     : "images on '" + camera.topic() + "' cannot be shown: " + problem) +
-                    "; camera:=NAMESPACE names another camera");
-    }
-    std::this_thread::sleep_for(std::chrono::milliseconds(5));
+    return NOT_STORED;
+  }
+  if (!missing.empty())
+  {
+    throw Problem(missing);
   }
   return PickWindow(view, overwrite, camera).run() ? STORED : NOT_STORED;
 }
@@ -432,22 +429,14 @@ int main(int argc, char** argv)
   try
   {
     bool overwrite = false;
-    CommandLine command_line(
+    CommandLine line(
         "Shows what the camera sees, and stores it as a view with a region that is dragged with the mouse.\n"
         "\n"
         "  rosrun view_servo pick_view NAME [OPTIONS] [camera:=NAMESPACE]",
         "Example: rosrun view_servo pick_view shelf --overwrite camera:=/camera\n"
         "Exit status: 0 stored, 1 not stored, 2 cannot, with one line on standard error.");
-    command_line.flag("overwrite", overwrite, "replace a view of that name");
-    std::vector<std::string> words;
-    ros::removeROSArgs(argc, argv, words);
-    std::vector<const char*> pointers;
-    pointers.reserve(words.size());
-    for (const std::string& word : words)
-    {
-      pointers.push_back(word.c_str());
-    }
-    const auto names = command_line.parse(static_cast<int>(pointers.size()), pointers.data());
+    line.flag("overwrite", overwrite, "replace a view of that name");
+    const auto names = parseWithoutRosWords(line, argc, argv);
     if (!names)
     {
       return STORED;  // --help
@@ -463,9 +452,7 @@ int main(int argc, char** argv)
           std::string("no window can be opened on display '") + (display == nullptr ? "" : display) +
           "': run it where there is one, or over ssh -X; without, view save NAME --roi X Y W H does the same");
     }
-    ros::init(argc, argv, "pick_view", ros::init_options::AnonymousName);
-    ros::console::set_logger_level(ROSCONSOLE_DEFAULT_NAME, ros::console::levels::Fatal);
-    ros::console::notifyLoggerLevelsChanged();
+    initQuietly(argc, argv, "pick_view");
     status = run(names->front(), overwrite);
   }
   catch (const std::exception& error)

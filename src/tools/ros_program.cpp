@@ -1,0 +1,42 @@
+// Copyright (c) 2026, the view_servo authors
+// SPDX-License-Identifier: BSD-3-Clause
+#include "tools/ros_program.h"
+
+#include <ros/console.h>
+#include <ros/init.h>
+#include <ros/master.h>
+
+#include <stdexcept>
+
+namespace view_servo
+{
+std::optional<std::vector<std::string>> parseWithoutRosWords(CommandLine& line, int argc, char** argv)
+{
+  std::vector<std::string> words;
+  ros::removeROSArgs(argc, argv, words);
+  std::vector<const char*> pointers;
+  pointers.reserve(words.size());
+  for (const std::string& word : words)
+  {
+    pointers.push_back(word.c_str());
+  }
+  return line.parse(static_cast<int>(pointers.size()), pointers.data());
+}
+
+void initQuietly(int argc, char** argv, const std::string& name, std::uint32_t options)
+{
+  ros::init(argc, argv, name, options | ros::init_options::AnonymousName);
+  ros::console::set_logger_level(ROSCONSOLE_DEFAULT_NAME, ros::console::levels::Fatal);
+  ros::console::notifyLoggerLevelsChanged();
+}
+
+void requireMaster()
+{
+  if (!ros::master::check())
+  {
+    throw std::runtime_error("no ROS master answers at " + ros::master::getURI() +
+                             ": start the robot's launch file, or set ROS_MASTER_URI");
+  }
+}
+
+}  // namespace view_servo
