@@ -59,5 +59,9 @@ RunOutcome run(ros::NodeHandle& nh, const sim::World& world, const RunParams& pa
  */
 int main(int argc, char** argv)
 {
-  return view_servo::runSimulation(argc, argv, "run_arm", "servo", {}, view_servo::run);
+  return view_servo::runSimulation(argc, argv,
+                                   { "run_arm", "servo",
+                                     "Runs 2.5D servoing of an arm once in simulation, with the nodes of "
+                                     "arm_servo.launch, and says how far off the camera ends." },
+                                   {}, view_servo::run);
 }

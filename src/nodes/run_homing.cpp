@@ -36,5 +36,9 @@ RunOutcome run(ros::NodeHandle& nh, const sim::World& world, const RunParams& pa
  */
 int main(int argc, char** argv)
 {
-  return view_servo::runSimulation(argc, argv, "run_homing", "homing", view_servo::homingRunParams(), view_servo::run);
+  return view_servo::runSimulation(argc, argv,
+                                   { "run_homing", "homing",
+                                     "Runs homing of a mobile base once in simulation, with the nodes of "
+                                     "homing.launch, and says how far off the base ends." },
+                                   view_servo::homingRunParams(), view_servo::run);
 }

@@ -127,5 +127,9 @@ RunOutcome run(ros::NodeHandle& nh, const sim::World& world, const RunParams& pa
  */
 int main(int argc, char** argv)
 {
-  return view_servo::runSimulation(argc, argv, "run_route", "route", view_servo::routeRunParams(), view_servo::run);
+  return view_servo::runSimulation(argc, argv,
+                                   { "run_route", "route",
+                                     "Records a route of a mobile base in simulation, with the nodes of route.launch, "
+                                     "has it followed once, and says how far off the base ends." },
+                                   view_servo::routeRunParams(), view_servo::run);
 }

@@ -4,6 +4,7 @@
 
 #include "sim/world_reader.h"
 #include "sim_ros/robot_messages.h"
+#include "sim_ros/run_command_line.h"
 #include "sim_ros/run_params.h"
 #include "view_servo/SaveView.h"
 #include "view_servo/ServoStatus.h"
@@ -35,6 +36,7 @@
 #include <iostream>
 #include <memory>
 #include <mutex>
+#include <optional>
 #include <stdexcept>
 #include <string>
 #include <thread>
@@ -356,21 +358,24 @@ inline void endWithRoslaunch()
 /**
  * main() of a program that runs a simulated robot once. Its parameters, all private, are those of RunParams. With `~exit`
  * it ends afterwards, with status 0 when the robot is at the view and 1 when not, and roslaunch ends, too, when that has
- * started the program.
+ * started the program. --help, and a command line that is wrong, are answered without a master.
  *
- * @param name of the node.
- * @param what is run, for the line that is printed.
+ * @param params the defaults.
  * @param run does it; an exception counts as a failed run.
  */
-inline int runSimulation(int argc, char** argv, const std::string& name, const std::string& what, RunParams params,
+inline int runSimulation(int argc, char** argv, const RunProgram& program, RunParams params,
                          const std::function<RunOutcome(ros::NodeHandle&, const sim::World&, const RunParams&)>& run)
 {
-  ros::init(argc, argv, name);
+  if (const std::optional<int> status = answerCommandLine(argc, argv, program, params))
+  {
+    return *status;
+  }
+  ros::init(argc, argv, program.name);
   ros::NodeHandle nh;
   ros::AsyncSpinner spinner(2);
   spinner.start();
   const auto end = [&](const RunOutcome& outcome) {
-    (outcome.success ? std::cout : std::cerr) << what << ": " << outcome.summary << std::endl;
+    (outcome.success ? std::cout : std::cerr) << program.what << ": " << outcome.summary << std::endl;
     if (!params.result.empty())
     {
       std::ofstream(params.result) << (outcome.success ? 0 : 1) << ' ' << outcome.summary << std::endl;

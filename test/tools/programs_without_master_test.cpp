@@ -1,0 +1,95 @@
+// Copyright (c) 2026, the view_servo authors
+// SPDX-License-Identifier: BSD-3-Clause
+
+/** @file Programs that work with ROS answer --help, and refuse a wrong command line, where no master is. */
+#include "support/program_run.h"
+#include "test_paths.h"
+
+#include <gtest/gtest.h>
+
+#include <string>
+#include <vector>
+
+namespace view_servo
+{
+namespace test
+{
+namespace
+{
+/** Killed, with status 137, when it waits for the master. */
+ProgramRun runWithoutMaster(const std::string& program, const std::vector<std::string>& arguments)
+{
+  return runProgram(
+      "timeout",
+      [&] {
+        std::vector<std::string> words{ "--signal=KILL", "20", program };
+        words.insert(words.end(), arguments.begin(), arguments.end());
+        return words;
+      }(),
+      "export ROS_MASTER_URI=http://localhost:1");
+}
+
+class RunProgramTest : public testing::TestWithParam<std::string>
+{
+protected:
+  void expectRefusal(const std::vector<std::string>& arguments, const std::string& culprit) const
+  {
+    expectBadInput(runWithoutMaster(GetParam(), arguments), culprit);
+  }
+};
+
+TEST_P(RunProgramTest, AnswersHelp)
+{
+  for (const std::string word : { "--help", "-h" })
+  {
+    const ProgramRun run = runWithoutMaster(GetParam(), { "_exit:=false", word });
+    EXPECT_EQ(run.status, 0);
+    EXPECT_EQ(run.err, "");
+    for (const std::string part : { "rosrun view_servo run_", "_world:=", "time limit of the goal [s; > 0]" })
+    {
+      EXPECT_NE(run.out.find(part), std::string::npos) << part << " in " << run.out;
+    }
+  }
+}
+
+TEST_P(RunProgramTest, RefusesWhatIsNotUnderstood)
+{
+  expectRefusal({ "desk" }, "'desk' is not understood; see --help");
+  expectRefusal({ "--world", "desk" }, "'--world' is not understood; see --help");
+  expectRefusal({ "_wrld:=desk" }, "unknown parameter 'wrld' (did you mean 'world'?); see --help");
+  expectRefusal({ "_timeout:=long" }, "parameter 'timeout': 'long' is not of type double; see --help");
+  expectRefusal({ "_timeout:=-1" }, "timeout must be > 0 s, not -1; see --help");
+  expectRefusal({ "_exit:=perhaps", "camera:=front" }, "parameter 'exit': 'perhaps'");
+}
+
+TEST_P(RunProgramTest, WaitsForTheMasterWithWhatIsUnderstood)
+{
+  const ProgramRun run = runProgram(
+      "timeout", { "2", GetParam(), "_world:=desk", "_timeout:=1e2", "_exit:=True", "__ns:=/a", "camera:=front" },
+      "export ROS_MASTER_URI=http://localhost:1");
+  EXPECT_EQ(run.status, 124) << run.out << run.err;
+}
+
+INSTANTIATE_TEST_SUITE_P(Programs, RunProgramTest, testing::Values(RUN_ARM_PATH, RUN_HOMING_PATH, RUN_ROUTE_PATH));
+
+/** Of those that take options. */
+class OptionProgramTest : public testing::TestWithParam<std::string>
+{
+};
+
+TEST_P(OptionProgramTest, AnswersHelpAndRefusesAnUnknownOption)
+{
+  const ProgramRun help = runWithoutMaster(GetParam(), { "--help" });
+  EXPECT_EQ(help.status, 0);
+  EXPECT_EQ(help.err, "");
+  EXPECT_NE(help.out.find("Options:"), std::string::npos) << help.out;
+  expectBadInput(runWithoutMaster(GetParam(), { "--nonsense" }), "--nonsense");
+}
+
+INSTANTIATE_TEST_SUITE_P(Programs, OptionProgramTest,
+                         testing::Values(CALIBRATE_HAND_EYE_PATH, CALIBRATE_MOUNT_PATH, CHECK_ROBOT_PATH,
+                                         PICK_VIEW_PATH));
+
+}  // namespace
+}  // namespace test
+}  // namespace view_servo
