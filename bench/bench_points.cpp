@@ -10,8 +10,8 @@
  *   error of the reference's four corners under 10 px; a match is correct within 4 px of the ground truth.
  * - tilt: planes textured with pictures of Debian's opencv-doc and visp-images-data, tilted 0 .. 80 degrees. Solved
  *   means a corner error under 5 px.
- * - time: medians of a match against a stored reference, of one of two fresh images, and of one where there is nothing to be
- *   found, in processor time, beside ORB, AKAZE and SIFT.
+ * - time: medians of a match against a stored reference, of one of two fresh images, and of one where there is nothing
+ *   to be found, in processor time, beside ORB, AKAZE and SIFT.
  */
 #include "options.h"
 #include "timing.h"

@@ -18,8 +18,8 @@
  * ecc: the same sequences with cv::findTransformECC from the last homography, which takes minutes.
  * hardships, what a tracker has to bear: 40 % of the plane covered by something that moves, and jumps of 150 px that
  * odometry tells of.
- * video: drift over bruegel.mp4 in the folder visp_planar_videos of VIEW_SERVO_DATA, from frame 0 alone; errors are those
- * of the corners of the region of interest, against a registration of each frame with frame 0.
+ * video: drift over bruegel.mp4 in the folder visp_planar_videos of VIEW_SERVO_DATA, from frame 0 alone; errors are
+ * those of the corners of the region of interest, against a registration of each frame with frame 0.
  */
 #include "view_servo/geometry/homography.h"
 #include "view_servo/images/image_io.h"
@@ -292,8 +292,8 @@ public:
   }
 
 private:
-  // More pixels or a wider filter take two to five times the time and make errors little smaller. Fewer pixels, no filter,
-  // or an end on the next level or earlier save up to half of it and make them two to five times as large.
+  // More pixels or a wider filter take two to five times the time and make errors little smaller. Fewer pixels, no
+  // filter, or an end on the next level or earlier save up to half of it and make them two to five times as large.
   static constexpr int SAMPLING = 4;              // [px] of a level
   static constexpr unsigned int FILTER_SIZE = 3;  // [px]
   static constexpr unsigned int LEVELS = 4;

@@ -2,16 +2,17 @@
 // SPDX-License-Identifier: BSD-3-Clause
 
 /** @file
- * What it costs to bring a camera's images to the nodes of homing.launch or arm_servo.launch: as processes, as nodelets of one
- * process, and as nodelets in the camera's own process, in one run:
+ * What it costs to bring a camera's images to the nodes of homing.launch or arm_servo.launch: as processes, as nodelets
+ * of one process, and as nodelets in the camera's own process, in one run:
  *
  *     bench_transport homing|arm [--seconds N]
  *
  * It starts a master of its own and plays a camera of rgb8 images at 30 Hz, of 640x480 and of 1280x720, that looks at a
- * stored view. For each it prints processor time, that of the camera and of all nodes [% of one core]: of the transport,
- * which is the difference between images that come and are not worked on, as no view is wanted, and no images; and of
- * everything while the view is matched, with how many matches come a second, which a busy machine makes fewer, and the time
- * from an image's stamp to its point_matches, median; with the arm, of homographies. Each is taken over N seconds.
+ * stored view. For each it prints processor time, that of the camera and of all nodes [% of one core]: of the
+ * transport, which is the difference between images that come and are not worked on, as no view is wanted, and no
+ * images; and of everything while the view is matched, with how many matches come a second, which a busy machine makes
+ * fewer, and the time from an image's stamp to its point_matches, median; with the arm, of homographies. Each is taken
+ * over N seconds.
  */
 #include "timing.h"
 #include "view_servo/Homography.h"
@@ -207,11 +208,16 @@ int freePort()
   return ntohs(address.sin_port);
 }
 
-/** A camera that looks at a picture, on a base that stands still: image_raw and camera_info of `camera`, odom, and tf. */
+/**
+ * A camera that looks at a picture, on a base that stands still: image_raw and camera_info of `camera`, odom, and tf.
+ */
 class PlayedCamera
 {
 public:
-  /** @param shares whether nodes in this process may get images without a copy: then each is a new one, as a driver's are. */
+  /**
+   * @param shares whether nodes in this process may get images without a copy: then each is a new one, as a driver's
+   * are.
+   */
   PlayedCamera(const cv::Mat& picture, bool shares) : shares_(shares)
   {
     ros::NodeHandle nh;

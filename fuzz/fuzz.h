@@ -15,10 +15,10 @@
 #include <string>
 
 /** @file
- * What the fuzz targets share. A target hands bytes to a reader; libFuzzer makes the bytes. A reader may accept them, or
- * refuse them by the exception that its header names, with a reason in one line. Anything else ends the program: another
- * exception, an answer that breaks its promise, what AddressSanitizer and UndefinedBehaviorSanitizer see, and inputs that
- * take too long or too much memory.
+ * What the fuzz targets share. A target hands bytes to a reader; libFuzzer makes the bytes. A reader may accept them,
+ * or refuse them by the exception that its header names, with a reason in one line. Anything else ends the program:
+ * another exception, an answer that breaks its promise, what AddressSanitizer and UndefinedBehaviorSanitizer see, and
+ * inputs that take too long or too much memory.
  */
 namespace view_servo::fuzz
 {

@@ -8,8 +8,8 @@
 namespace view_servo::check
 {
 /** @file
- * What measured numbers mean for homing and servoing, and what to do. Each function returns a finding for each name in its
- * comment; such a name is Finding::name.
+ * What measured numbers mean for homing and servoing, and what to do. Each function returns a finding for each name in
+ * its comment; such a name is Finding::name.
  */
 
 /** "images", "picture", "sharpness", "camera_info", "calibration", "image stamps". */
@@ -21,7 +21,10 @@ Findings judgePicture(const PictureMeasures& picture);
 /** "camera frame" and "tf", and for a base "camera mount". @param is_arm whether the camera is in an arm's hand. */
 Findings judgeMount(const MountObservations& mount, bool is_arm);
 
-/** "odometry", "odometry frames", "odometry stamps", "clocks" and "odometry at rest". @param image_age as StreamObservations::age [s]. */
+/**
+ * "odometry", "odometry frames", "odometry stamps", "clocks" and "odometry at rest". @param image_age as
+ * StreamObservations::age [s].
+ */
 Findings judgeOdometry(const OdometryObservations& odometry, double image_age);
 
 /** "commands". */

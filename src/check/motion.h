@@ -48,8 +48,8 @@ struct ImagePair
 
 /**
  * The motion of a base on a level floor. Images tell the camera's motion but not its length.
- * @param measured pose of the base after the motion in the base before it, by odometry [m, rad]. The length of its way is
- * taken for the camera's, so that the base's motion follows from where the camera is mounted.
+ * @param measured pose of the base after the motion in the base before it, by odometry [m, rad]. The length of its way
+ * is taken for the camera's, so that the base's motion follows from where the camera is mounted.
  */
 SeenMotion seenByBase(const ImagePair& images, const CameraMount& mount, const PlanarPose& measured);
 
@@ -73,8 +73,8 @@ struct Leg
 };
 
 /**
- * Compares the three: who of command, odometry or tf, and images disagrees with the two others in sign and direction, and
- * by how much lengths and angles differ. Of a translation images tell the direction alone.
+ * Compares the three: who of command, odometry or tf, and images disagrees with the two others in sign and direction,
+ * and by how much lengths and angles differ. Of a translation images tell the direction alone.
  */
 Finding judgeLeg(const Leg& leg);
 

@@ -14,8 +14,8 @@
 namespace view_servo::check
 {
 /** @file
- * What was measured at a robot, without ROS. Texts named `fault` are those of the nodes' own checks, in one line; empty:
- * there is none. Topics are named as other nodes see them.
+ * What was measured at a robot, without ROS. Texts named `fault` are those of the nodes' own checks, in one line;
+ * empty: there is none. Topics are named as other nodes see them.
  */
 
 /** What a number is that was not measured. */

@@ -21,8 +21,8 @@ struct PictureMeasures
 };
 
 /**
- * How blurred the edges of a picture are: the median of the standard deviations of the Gaussians that would make them of
- * steps [px]. Noise hardly matters, as only places of much contrast count.
+ * How blurred the edges of a picture are: the median of the standard deviations of the Gaussians that would make them
+ * of steps [px]. Noise hardly matters, as only places of much contrast count.
  * @param grey 8-bit, one channel. @return NaN when there are too few edges to tell.
  */
 double edgeWidth(const cv::Mat& grey);

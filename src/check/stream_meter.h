@@ -12,7 +12,10 @@ namespace view_servo::check
 class StreamMeter
 {
 public:
-  /** @param age time from the message's stamp to now, by this computer's clock [s]. @param late a newer stamp has come before. */
+  /**
+   * @param age time from the message's stamp to now, by this computer's clock [s]. @param late a newer stamp has come
+   * before.
+   */
   void add(double time, double age, bool late);
 
   /** Sets count, rate, usual_gap, age and late_share. */

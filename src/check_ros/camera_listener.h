@@ -24,7 +24,10 @@ namespace view_servo::check
 /** Time of a steady clock [s]. */
 double steadySeconds();
 
-/** Listens to a camera's images and calibrations, also to those that nodes would refuse. Safe to use from several threads. */
+/**
+ * Listens to a camera's images and calibrations, also to those that nodes would refuse. Safe to use from several
+ * threads.
+ */
 class CameraListener
 {
 public:

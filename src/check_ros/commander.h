@@ -19,8 +19,8 @@ namespace view_servo::check
 inline const VelocityLimits TEST_LIMITS{ 0.05, 0.12, 0.1, 0.3 };
 
 /**
- * Drives a robot over short ways. However a way ends, and when this object ends, zeros are sent. A command that another node
- * sends ends the drive.
+ * Drives a robot over short ways. However a way ends, and when this object ends, zeros are sent. A command that another
+ * node sends ends the drive.
  */
 class Commander
 {

@@ -18,15 +18,18 @@
 
 namespace view_servo::check
 {
-/** Listens to a robot's topics from the construction on, and says what is there and what does not fit. Publishes nothing. */
+/**
+ * Listens to a robot's topics from the construction on, and says what is there and what does not fit. Publishes
+ * nothing.
+ */
 class RobotCheck
 {
 public:
   RobotCheck(const ros::NodeHandle& nh, const Setup& setup);
 
   /**
-   * Waits, by a steady clock. @param duration [s]. @param given_up asked every few milliseconds; once it is true, the wait
-   * ends.
+   * Waits, by a steady clock. @param duration [s]. @param given_up asked every few milliseconds; once it is true, the
+   * wait ends.
    */
   static void listen(double duration, const std::function<bool()>& given_up);
 

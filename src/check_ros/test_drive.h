@@ -23,8 +23,8 @@ struct DriveParams
 };
 
 /**
- * Moves the robot a little, there and back, and compares command, odometry (of an arm: tf) and images. Refuses while there
- * are errors that would make it meaningless or dangerous.
+ * Moves the robot a little, there and back, and compares command, odometry (of an arm: tf) and images. Refuses while
+ * there are errors that would make it meaningless or dangerous.
  */
 class TestDrive
 {
@@ -36,8 +36,8 @@ public:
   TestDrive(const RobotCheck& robot, const DriveParams& params, std::function<bool()> given_up);
 
   /**
-   * Why the robot must not be moved; empty: it may. @param findings what RobotCheck found. @param by_hand whether somebody
-   * moves it, without commands.
+   * Why the robot must not be moved; empty: it may. @param findings what RobotCheck found. @param by_hand whether
+   * somebody moves it, without commands.
    */
   std::string refusal(const Findings& findings, bool by_hand) const;
 
@@ -79,7 +79,9 @@ private:
   std::string objection(const std::optional<PlanarPose>& begin);
   /** Drives one way and judges it. @return false when the drive cannot go on. */
   bool driveLeg(Commander& commander, Place& here, const std::string& name, const Twist& way, Findings& findings);
-  /** How far odometry's and the images' stamps are apart, by a turn in `trace_`. @param before the image when it began. */
+  /**
+   * How far odometry's and the images' stamps are apart, by a turn in `trace_`. @param before the image when it began.
+   */
   Finding judgeClocks(const CameraFrame& before) const;
 
   const RobotCheck& robot_;

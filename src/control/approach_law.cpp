@@ -124,7 +124,8 @@ public:
     course.end = compose(goal_in_odom_, part_ == Part::LAST_TURN ? PlanarPose() : leg().end);
     if (part_ == Part::LEG)
     {
-      // Of the last leg only the way along it is what was seen last. The others end at speed: what comes next is a turn.
+      // Of the last leg only the way along it is what was seen last. The others end at speed: what comes next is a
+      // turn.
       const PlanarPose on_axis = compose(inverse(axis_in_odom_), base_in_odom_);
       course.end = isLast() ? compose(axis_in_odom_, { on_axis.x - base_.x, 0.0, 0.0 })
                             : compose(course.end, { leg().backwards ? -PASSED : PASSED, 0.0, 0.0 });
@@ -291,8 +292,8 @@ private:
   }
 
   /**
-   * Goes back a little and comes again, by odometry alone: what is seen at the goal is exact, what is seen from a little
-   * farther away may be wrong in the same way each time. Where that does not help, less has to do.
+   * Goes back a little and comes again, by odometry alone: what is seen at the goal is exact, what is seen from a
+   * little farther away may be wrong in the same way each time. Where that does not help, less has to do.
    * @param error distance from the goal to where the base stands [m].
    */
   void correct(const Situation& situation, double error)

@@ -39,8 +39,8 @@ void append(Samples& samples, double stamp, double yaw, double kept)
 }
 
 /**
- * Mean turn of the view that no turn of the base explains. @param turn_error by which part odometry may turn too much or too
- * little.
+ * Mean turn of the view that no turn of the base explains. @param turn_error by which part odometry may turn too much
+ * or too little.
  */
 double unexplained(const std::vector<double>& views, const std::vector<double>& bases, double turn_error)
 {
@@ -89,8 +89,8 @@ std::optional<double> ClockOffset::estimate() const
 {
   constexpr double SKIDDING = 0.2;
   constexpr double CLEARLY_BETTER = 0.6;
-  // Where a turn only dies away, as a control makes it, an error of odometry and one of time look nearly the same: odometry's
-  // turns are taken for right unless they explain the view's much worse.
+  // Where a turn only dies away, as a control makes it, an error of odometry and one of time look nearly the same:
+  // odometry's turns are taken for right unless they explain the view's much worse.
   const Fit right = fit(0.0);
   const Fit wrong = fit(SKIDDING);
   return wrong.unexplained < CLEARLY_BETTER * right.unexplained ? wrong.offset : right.offset;

@@ -26,8 +26,8 @@ inline PeerFeatures featuresOfPeer(const cv::Ptr<cv::Feature2D>& detector, const
 }
 
 /**
- * Matches by OpenCV's key points and descriptors, to measure beside: the nearest descriptor of the current image, where the
- * second nearest is farther by a quarter at least (Lowe 2004).
+ * Matches by OpenCV's key points and descriptors, to measure beside: the nearest descriptor of the current image, where
+ * the second nearest is farther by a quarter at least (Lowe 2004).
  * @return positions in the reference image and, in the same order, in the current one [px].
  */
 inline std::pair<std::vector<cv::Point2f>, std::vector<cv::Point2f>> matchesOfPeer(

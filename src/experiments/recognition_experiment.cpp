@@ -98,7 +98,9 @@ private:
   ViewIndex index_;
 };
 
-/** Words of ORB descriptors: 2,000 of them, learnt from the unrelated pictures, weighed by tf-idf, compared by angles. */
+/**
+ * Words of ORB descriptors: 2,000 of them, learnt from the unrelated pictures, weighed by tf-idf, compared by angles.
+ */
 class BagOfWords : public Ranking
 {
 public:

@@ -33,7 +33,9 @@ struct RouteRunOrder
   std::uint64_t seed;
 };
 
-/** From 1.6 m behind the world's goal to 0.4 m before it, by two bends; all waypoints look about where the goal does. */
+/**
+ * From 1.6 m behind the world's goal to 0.4 m before it, by two bends; all waypoints look about where the goal does.
+ */
 std::vector<PlanarPose> randomWaypoints(const sim::World& world, Rng& rng)
 {
   std::vector<PlanarPose> waypoints;

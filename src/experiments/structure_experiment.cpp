@@ -80,7 +80,9 @@ Outcome home(const Lesson& lesson, bool learnt, const PlanarPose& start, std::ui
   return outcome;
 }
 
-/** Parts by which depths are wrong, of points that would move by 10 px and more if the camera moved as in the lesson. */
+/**
+ * Parts by which depths are wrong, of points that would move by 10 px and more if the camera moved as in the lesson.
+ */
 std::vector<double> depthErrors(const Lesson& lesson)
 {
   constexpr double LEAST_PARALLAX = 10.0;  // [px]

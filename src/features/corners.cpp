@@ -44,8 +44,8 @@ cv::Mat harrisResponse(const cv::Mat& image, const CornerParams& params)
   const cv::Mat window = gaussianKernel(params.integration_sigma, 0);
   cv::Mat response(image.size(), CV_32F);
 
-  // Stripes of rows are independent: each is filtered from its rows and as many beside them as the kernels reach. They are so
-  // narrow that all of what is computed on the way stays in the processor's cache.
+  // Stripes of rows are independent: each is filtered from its rows and as many beside them as the kernels reach. They
+  // are so narrow that all of what is computed on the way stays in the processor's cache.
   constexpr int STRIPE = 64;  // [rows]
   const int reach = smooth.cols / 2 + window.cols / 2;
   const int stripes = std::max(1, image.rows / STRIPE);

@@ -31,8 +31,8 @@ int sampleCount(double length)
 }
 
 /**
- * The basis vectors of eq. 6.3 at (i + 1/2)/N, divided by N, for the first half of the samples: in the second they are the
- * same backwards, or the negative of that. Of each order one of sine and cosine is the one, and one the other.
+ * The basis vectors of eq. 6.3 at (i + 1/2)/N, divided by N, for the first half of the samples: in the second they are
+ * the same backwards, or the negative of that. Of each order one of sine and cosine is the one, and one the other.
  */
 class Basis
 {

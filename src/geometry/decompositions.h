@@ -10,8 +10,8 @@
 namespace view_servo
 {
 /** @file
- * Decompositions of matrices, and products of matrices of any size, by Eigen. Each is compiled in one place, as it takes a
- * compiler seconds.
+ * Decompositions of matrices, and products of matrices of any size, by Eigen. Each is compiled in one place, as it
+ * takes a compiler seconds.
  */
 
 /** Eigenvalues and eigenvectors of a symmetric matrix. */

@@ -37,8 +37,8 @@ struct State
 };
 
 /**
- * A state after a step (DOF x 1): camera on flange, place [m] and rotation [rad] along the flange's axes; view in base likewise;
- * direction of the plane [rad]; logarithm of its distance.
+ * A state after a step (DOF x 1): camera on flange, place [m] and rotation [rad] along the flange's axes; view in base
+ * likewise; direction of the plane [rad]; logarithm of its distance.
  */
 State moved(const State& state, const Eigen::VectorXd& step);
 
@@ -74,15 +74,17 @@ public:
   }
 
   /**
-   * The direction of the plane on which most homographies agree, and the second best when it is another one: which of two
-   * is true may be left open by the images, not by the arm.
+   * The direction of the plane on which most homographies agree, and the second best when it is another one: which of
+   * two is true may be left open by the images, not by the arm.
    */
   std::vector<Eigen::Vector3d> normals() const;
 
   /** The camera's motion from the view to each pose, when the plane has that normal. */
   std::vector<EuclideanHomography> motionsBefore(const Eigen::Vector3d& normal) const;
 
-  /** Where the view's corners should be, less where they are [px], ROWS x 1. False when a corner is behind the camera. */
+  /**
+   * Where the view's corners should be, less where they are [px], ROWS x 1. False when a corner is behind the camera.
+   */
   bool errors(const State& state, std::size_t i, Eigen::VectorXd& errors) const;
   /** The same with the flange elsewhere than the robot has it [m]. */
   bool errors(const State& state, std::size_t i, const Eigen::Isometry3d& base_in_flange,
@@ -92,8 +94,8 @@ public:
   double squaredError(const State& state, std::size_t i) const;
 
   /**
-   * Derivatives of errors() by the state, in the order of moved() (ROWS x DOF), and by the flange's place and rotation along
-   * its own axes (ROWS x 6) [px per m or rad].
+   * Derivatives of errors() by the state, in the order of moved() (ROWS x DOF), and by the flange's place and rotation
+   * along its own axes (ROWS x 6) [px per m or rad].
    */
   void linearize(const State& state, std::size_t i, Eigen::MatrixXd& by_state, Eigen::MatrixXd& by_arm) const;
   /** The same with the flange elsewhere than the robot has it [m]. */

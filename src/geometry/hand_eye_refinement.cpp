@@ -160,8 +160,8 @@ std::vector<Eigen::MatrixXd> whiteningsOf(const Problem& problem, const State& s
 }
 
 /**
- * How far each pose is from what the others say, squared, in units that are the same for all: errors that a pose would have
- * had it not been used, against the covariance of these.
+ * How far each pose is from what the others say, squared, in units that are the same for all: errors that a pose would
+ * have had it not been used, against the covariance of these.
  */
 std::vector<double> disagreements(const Problem& problem, const State& state, const Indices& used,
                                   const ErrorModel& model, double lever)

@@ -56,8 +56,8 @@ Eigen::Matrix3d rotationOnFlange(const Problem& problem, const Indices& three,
 }
 
 /**
- * The camera's place on the flange [m], then the plane's distance from the view's camera [m], from three poses and the camera's
- * rotation on the flange.
+ * The camera's place on the flange [m], then the plane's distance from the view's camera [m], from three poses and the
+ * camera's rotation on the flange.
  */
 Eigen::Vector4d placeAndDistance(const Problem& problem, const Indices& three,
                                  const std::vector<EuclideanHomography>& motions, const Eigen::Matrix3d& rotation)

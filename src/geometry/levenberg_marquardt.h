@@ -30,7 +30,8 @@ inline double huberWeight(double squared_error, double width)
  * A Problem has
  *  - `State`, `static constexpr int DOF`,
  *  - `double cost(const State&) const`: infinite or NaN where the state is not allowed,
- *  - `void linearize(const State&, Matrix<DOF, DOF>& jtj, Vector<DOF>& gradient) const`: sets the sums of J^T J and J^T r,
+ *  - `void linearize(const State&, Matrix<DOF, DOF>& jtj, Vector<DOF>& gradient) const`: sets the sums of J^T J and J^T
+ *    r,
  *  - `State moved(const State&, const Vector<DOF>& step) const`.
  */
 template <typename Problem>

@@ -121,8 +121,8 @@ struct RefinablePairs
 
 /**
  * The pairs that a refinement can use, normalised.
- * @param least number of pairs that the refinement needs. @param error double(const Correspondence&), not finite for a pair
- * that has no gradient to follow and is left out. @return empty when too few remain or they cannot be normalised.
+ * @param least number of pairs that the refinement needs. @param error double(const Correspondence&), not finite for a
+ * pair that has no gradient to follow and is left out. @return empty when too few remain or they cannot be normalised.
  */
 template <typename Error>
 std::optional<RefinablePairs> refinablePairs(const Correspondences& pairs, std::size_t least, const Error& error)

@@ -45,7 +45,9 @@ public:
 
   static constexpr int LANES = 8;  // numbers of 16 bits that are multiplied at once
 
-  /** @param to_reference maps offsets in the current image to offsets in the reference. False: leaves it, or is flat. */
+  /**
+   * @param to_reference maps offsets in the current image to offsets in the reference. False: leaves it, or is flat.
+   */
   bool draw(const cv::Mat& reference, const Eigen::Vector2d& at, const Eigen::Matrix2d& to_reference)
   {
     constexpr double ROUNDING = 0.01;  // of places in single precision [px]

@@ -16,8 +16,8 @@ namespace view_servo
 {
 /**
  * Kd-tree over vectors of a few numbers, whose count the compiler knows so that distances use SIMD. It is split in the
- * middle of the longest side of what is to be split; distances to cells grow by one coordinate with each step down (S. Arya,
- * D. Mount: Algorithms for fast vector quantization, 1993).
+ * middle of the longest side of what is to be split; distances to cells grow by one coordinate with each step down (S.
+ * Arya, D. Mount: Algorithms for fast vector quantization, 1993).
  */
 template <int Columns>
 class KdTree
@@ -65,7 +65,9 @@ public:
     search(query, (1.0F + tolerance) * (1.0F + tolerance), nearest);
   }
 
-  /** The vectors, in no order, of the leaf that the query falls in: from the first of two pointers to before the second. */
+  /**
+   * The vectors, in no order, of the leaf that the query falls in: from the first of two pointers to before the second.
+   */
   std::pair<const std::uint32_t*, const std::uint32_t*> leafOf(const float* query) const
   {
     if (nodes_.empty())
@@ -234,7 +236,9 @@ private:
     }
   }
 
-  /** Whether the query is nearer to the vectors left of the split than to those right of it, by the column of the split. */
+  /**
+   * Whether the query is nearer to the vectors left of the split than to those right of it, by the column of the split.
+   */
   static bool leftIsNearer(const Node& node, const float* query)
   {
     const float value = query[static_cast<std::size_t>(node.column)];
@@ -285,7 +289,8 @@ private:
 
   /**
    * Searches below a node, the nearer child first.
-   * @param squared_distance of the query from the node's cell. @param offsets its parts by column; the same after the call.
+   * @param squared_distance of the query from the node's cell. @param offsets its parts by column; the same after the
+   * call.
    */
   template <typename Collector>
   void descend(std::size_t number, const float* query, float squared_factor, float squared_distance,

@@ -435,7 +435,9 @@ private:
     }
   }
 
-  /** Whether what lies beside the best matches of a first, rough map is somewhat alike: refining costs more to find out. */
+  /**
+   * Whether what lies beside the best matches of a first, rough map is somewhat alike: refining costs more to find out.
+   */
   bool promises(const LineRegion& region) const
   {
     constexpr std::size_t TRIED = 6;

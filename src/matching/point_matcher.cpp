@@ -77,7 +77,10 @@ struct Entry
   std::size_t place = 0;
 };
 
-/** Puts an entry among the largest of its row or column, largest first; it is larger than the last; those found first stay. */
+/**
+ * Puts an entry among the largest of its row or column, largest first; it is larger than the last; those found first
+ * stay.
+ */
 void addToLargest(const Entry& entry, Entry* largest, std::size_t count)
 {
   std::size_t k = count - 1;
@@ -88,7 +91,9 @@ void addToLargest(const Entry& entry, Entry* largest, std::size_t count)
   largest[k] = entry;
 }
 
-/** The places, in order, of the `count` largest positive entries of each row and of each column of a matrix; 0 = of all. */
+/**
+ * The places, in order, of the `count` largest positive entries of each row and of each column of a matrix; 0 = of all.
+ */
 std::vector<std::size_t> strongestEntries(const std::vector<float>& matrix, std::size_t rows, std::size_t columns,
                                           int count)
 {

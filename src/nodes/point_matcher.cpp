@@ -115,8 +115,8 @@ private:
  * each camera image with that stored view.
  *
  * Topics, services and parameters are those of a StreamingMatcher, with parameters(PointViewMatcherParams&);
- * config/point_matcher.yaml has them with their ranges. It publishes `~point_matches` (view_servo/PointMatches), and its
- * service is `~match` (view_servo/MatchPoints).
+ * config/point_matcher.yaml has them with their ranges. It publishes `~point_matches` (view_servo/PointMatches), and
+ * its service is `~match` (view_servo/MatchPoints).
  */
 using PointMatcherNode = StreamingMatcher<PointMatching>;
 

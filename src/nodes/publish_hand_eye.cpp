@@ -33,8 +33,8 @@ std::string rootOf(const tf2_ros::Buffer& buffer, std::string frame)
 }
 
 /**
- * The transform to publish. Each frame of tf has one parent at most: of a camera whose driver publishes frames of its own, such
- * as camera_link above the optical frame, the top one is placed.
+ * The transform to publish. Each frame of tf has one parent at most: of a camera whose driver publishes frames of its
+ * own, such as camera_link above the optical frame, the top one is placed.
  */
 geometry_msgs::TransformStamped placed(const tf2_ros::Buffer& buffer, const HandEyeFile& file, bool inverse)
 {
@@ -95,8 +95,9 @@ void run()
 /**
  * Publishes a hand-eye calibration as a static transform.
  *
- * Parameters: `~file` (string) as calibrate_hand_eye or easy_handeye writes it; `~inverse` (bool, false) the flange in the
- * camera's frame instead, where tf has the camera above; `~patience` (double, 2.0) for how long tf is listened to before [s].
+ * Parameters: `~file` (string) as calibrate_hand_eye or easy_handeye writes it; `~inverse` (bool, false) the flange in
+ * the camera's frame instead, where tf has the camera above; `~patience` (double, 2.0) for how long tf is listened to
+ * before [s].
  *
  * Publishes: `/tf_static`, from the flange to the camera's frame, or to the frame at the top of the camera's own tree.
  */

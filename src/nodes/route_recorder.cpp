@@ -41,8 +41,8 @@ namespace view_servo
  * RouteSpacing), and at the end. Private parameters: see RouteRecorderParams.
  *
  * Subscribes `image_raw`, `camera_info` (see CameraInput), `odom` (nav_msgs/Odometry), of `~base_frame`, and tf.
- * Services: `~start` (view_servo/StartRoute); `~stop` (std_srvs/Trigger): stores the route. When that cannot be, the answer
- * says why, and the views that belong to it are removed. Publishes `/diagnostics`.
+ * Services: `~start` (view_servo/StartRoute); `~stop` (std_srvs/Trigger): stores the route. When that cannot be, the
+ * answer says why, and the views that belong to it are removed. Publishes `/diagnostics`.
  */
 class RouteRecorderNode : private NodeBase
 {
@@ -128,7 +128,9 @@ private:
     }
   }
 
-  /** Waits for an image that is taken from now on, with odometry. @throws std::runtime_error saying what does not come. */
+  /**
+   * Waits for an image that is taken from now on, with odometry. @throws std::runtime_error saying what does not come.
+   */
   Place waitForPlace()
   {
     const ros::Time now = ros::Time::now();
@@ -346,8 +348,8 @@ private:
   }
 
   /**
-   * Stores where the things are that a view shows, so that a follower knows it from the start; that this fails is no fault of the
-   * route. @param moved pose of the base at the other view in the base at this one.
+   * Stores where the things are that a view shows, so that a follower knows it from the start; that this fails is no
+   * fault of the route. @param moved pose of the base at the other view in the base at this one.
    */
   void learn(const StoredView& view, const StoredView& other, const PlanarPose& moved) const
   {

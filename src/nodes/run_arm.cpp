@@ -54,8 +54,8 @@ RunOutcome run(ros::NodeHandle& nh, const sim::World& world, const RunParams& pa
 }  // namespace view_servo
 
 /**
- * Runs 2.5D servoing once in simulation, and says how far off the camera ends. Parameters: see runSimulation(); `~start` is
- * one of the world's starts. With `~approach` the goal is a list of two views.
+ * Runs 2.5D servoing once in simulation, and says how far off the camera ends. Parameters: see runSimulation();
+ * `~start` is one of the world's starts. With `~approach` the goal is a list of two views.
  */
 int main(int argc, char** argv)
 {

@@ -121,9 +121,9 @@ RunOutcome run(ros::NodeHandle& nh, const sim::World& world, const RunParams& pa
 }  // namespace view_servo
 
 /**
- * Records a route in simulation, from a start to the world's goal, has it followed once, and says how far off the base ends.
- * Parameters: see runSimulation(); `~start` is "x y yaw" [m, m, rad], or the name of one of the world's starts; `~view` is
- * the route's name.
+ * Records a route in simulation, from a start to the world's goal, has it followed once, and says how far off the base
+ * ends. Parameters: see runSimulation(); `~start` is "x y yaw" [m, m, rad], or the name of one of the world's starts;
+ * `~view` is the route's name.
  */
 int main(int argc, char** argv)
 {

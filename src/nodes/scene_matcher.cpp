@@ -207,8 +207,8 @@ private:
  * the answer has the motion between the cameras, up to the distance.
  *
  * Topics, services and parameters are those of a StreamingMatcher, with parameters(SceneMatcherParams&);
- * config/scene_matcher.yaml has them with their ranges. It publishes `~scene_matches` (view_servo/SceneMatches), and its
- * service is `~match` (view_servo/MatchScene).
+ * config/scene_matcher.yaml has them with their ranges. It publishes `~scene_matches` (view_servo/SceneMatches), and
+ * its service is `~match` (view_servo/MatchScene).
  */
 using SceneMatcherNode = StreamingMatcher<SceneMatching>;
 

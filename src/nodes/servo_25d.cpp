@@ -125,22 +125,24 @@ std::vector<ServoView> viewsOf(const ServoToViewGoal& goal)
 }  // namespace
 
 /**
- * Brings the camera in an arm's hand to where a view was stored, by the homographies of a plane (2.5D servoing). Private
- * parameters: see ServoDriverParams.
+ * Brings the camera in an arm's hand to where a view was stored, by the homographies of a plane (2.5D servoing).
+ * Private parameters: see ServoDriverParams.
  *
  * Subscribes:
  *  - `homography` (view_servo/Homography), of homography_tracker, which follows `~wanted_view`;
- *  - `camera_info` (sensor_msgs/CameraInfo): of the same camera. With distortion, P's K counts, as in homography_tracker;
- *  - `joint_states` (sensor_msgs/JointState), where there are any: a joint at a limit of `robot_description` that does not
- *    come away from it ends a goal. Once they have come, the camera stands still when they cease for `~joint_timeout`.
+ *  - `camera_info` (sensor_msgs/CameraInfo): of the same camera. With distortion, P's K counts, as in
+ *    homography_tracker;
+ *  - `joint_states` (sensor_msgs/JointState), where there are any: a joint at a limit of `robot_description` that does
+ *    not come away from it ends a goal. Once they have come, the camera stands still when they cease for
+ *    `~joint_timeout`.
  *
  * Publishes, besides what every driver does (see DriverNode):
- *  - `cmd_vel` (geometry_msgs/TwistStamped, the camera's twist in its optical frame), or `cmd_vel_dry`; zero for a while
- *    after each end, then nothing;
+ *  - `cmd_vel` (geometry_msgs/TwistStamped, the camera's twist in its optical frame), or `cmd_vel_dry`; zero for a
+ *    while after each end, then nothing;
  *  - `servo_error` (view_servo/ServoError): after each homography, for plots.
  *
- * Action: `servo` (view_servo/ServoToView). The chosen point is the middle of the view's region. All views of a goal are read
- * before anything moves. Between two of them the camera stands until the tracker has found the next one.
+ * Action: `servo` (view_servo/ServoToView). The chosen point is the middle of the view's region. All views of a goal
+ * are read before anything moves. Between two of them the camera stands until the tracker has found the next one.
  */
 class ServoDriver
 {

@@ -101,8 +101,8 @@ std::string describe(const std::vector<CandidateView>& views, std::size_t indexe
  * Services:
  *  - `~recognize` (view_servo/RecognizeView).
  *
- * A thread of its own keeps the index in step with the store, and saves it beside the views, so that it is there at once
- * when the node starts again. Views that were saved a moment ago are indexed before a request is answered.
+ * A thread of its own keeps the index in step with the store, and saves it beside the views, so that it is there at
+ * once when the node starts again. Views that were saved a moment ago are indexed before a request is answered.
  */
 class ViewRecognizerNode : private NodeBase
 {

@@ -16,7 +16,9 @@ namespace view_servo
 {
 namespace
 {
-/** Counts the values of a node, aliases followed. @throws std::runtime_error as soon as there are too many, or too deep. */
+/**
+ * Counts the values of a node, aliases followed. @throws std::runtime_error as soon as there are too many, or too deep.
+ */
 void countValues(const YAML::Node& node, std::size_t depth, std::size_t& count)
 {
   constexpr std::size_t MOST = 1'000'000;

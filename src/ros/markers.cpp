@@ -111,7 +111,10 @@ Marker at(const Eigen::Isometry3d& pose, Marker marker)
   return marker;
 }
 
-/** The image's corners on the plane z = 1, beginning at the upper left, clockwise. Where the lens has no rays, a pinhole's. */
+/**
+ * The image's corners on the plane z = 1, beginning at the upper left, clockwise. Where the lens has no rays, a
+ * pinhole's.
+ */
 Places cornersOf(const Camera& camera)
 {
   constexpr double FARTHEST = 3.0;  // 72 degrees from the axis

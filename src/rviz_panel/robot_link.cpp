@@ -102,7 +102,9 @@ public:
   virtual void cancelAll() = 0;
 };
 
-/** `end` is told, by a thread of the callback queue, how a goal has ended: whether at the view, and the driver's words. */
+/**
+ * `end` is told, by a thread of the callback queue, how a goal has ended: whether at the view, and the driver's words.
+ */
 template <typename Action>
 class ActionDriver : public DriverClient
 {

@@ -37,8 +37,8 @@ public:
   /** Opens the gate of the driver that is there. */
   void enable();
   /**
-   * Cancels all goals of both drivers at once, by topics that were advertised before; then closes their gates, whatever was
-   * asked of them before.
+   * Cancels all goals of both drivers at once, by topics that were advertised before; then closes their gates, whatever
+   * was asked of them before.
    */
   void stop();
 

@@ -67,8 +67,8 @@ private:
 };
 
 /**
- * Runs tasks one after the other in a thread of its own. Calls of services that are late, or that have to make room, are
- * ended by expire(), as roscpp knows no deadline. Its methods do not wait, and are for one thread.
+ * Runs tasks one after the other in a thread of its own. Calls of services that are late, or that have to make room,
+ * are ended by expire(), as roscpp knows no deadline. Its methods do not wait, and are for one thread.
  */
 class TaskWorker
 {

@@ -36,8 +36,8 @@ constexpr double NO_MOTION = 1e-9;      // joint velocity, as part of the fastes
 constexpr double POSE_ACCURACY = 1e-6;  // of inverse kinematics [m, rad]
 
 /**
- * Gathers what urdfdom has to say about a faulty URDF, which it otherwise only prints. One at a time: whom console_bridge
- * tells is one for all threads.
+ * Gathers what urdfdom has to say about a faulty URDF, which it otherwise only prints. One at a time: whom
+ * console_bridge tells is one for all threads.
  */
 class ParserErrors : public console_bridge::OutputHandler
 {

@@ -44,7 +44,8 @@ std::vector<Parameter> parameters(NomadParams& params);
 
 /**
  * A base. By default it is holonomic like the Nomad 200, which moves in any direction without turning and turns without
- * moving. Its poses lie on the floor. Odometry measures how the wheels turn: while they slip, that is more than the way.
+ * moving. Its poses lie on the floor. Odometry measures how the wheels turn: while they slip, that is more than the
+ * way.
  */
 class Nomad
 {

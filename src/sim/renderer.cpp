@@ -42,9 +42,9 @@ std::mutex& mesaMutex()
 }
 
 /**
- * A number of columns beside the picture's that no other context of the process has meanwhile. Mesa 20 has contexts of the
- * same size draw into one buffer, from whatever threads they draw: so no two are to be of the same size. Not of rows, as Mesa
- * counts these from the far end, and rounds otherwise then.
+ * A number of columns beside the picture's that no other context of the process has meanwhile. Mesa 20 has contexts of
+ * the same size draw into one buffer, from whatever threads they draw: so no two are to be of the same size. Not of
+ * rows, as Mesa counts these from the far end, and rounds otherwise then.
  */
 class OwnColumns
 {
@@ -95,8 +95,8 @@ struct SimulatedCamera::Context
   explicit Context(const cv::Size& wanted) : size(wanted)
   {
     constexpr int DEPTH_BITS = 24;
-    // Mesa's threads, by default one for each core, wait for each other at every picture: where other nodes use the cores,
-    // too, one is quicker. Who sets the variable has the last word.
+    // Mesa's threads, by default one for each core, wait for each other at every picture: where other nodes use the
+    // cores, too, one is quicker. Who sets the variable has the last word.
     constexpr int KEEP_WHAT_IS_SET = 0;
     setenv("LP_NUM_THREADS", "1", KEEP_WHAT_IS_SET);
     {

@@ -30,8 +30,8 @@ std::optional<double> firstHit(const World& world, const Eigen::Vector3d& origin
 double shareInSight(const World& world, const Eigen::Isometry3d& reference, const Eigen::Isometry3d& current);
 
 /**
- * The rectangle around what the world's region, as seen from its goal, is in an image from elsewhere [px], within that image;
- * empty when nothing of it is there. Of a world without a region, that is the whole image.
+ * The rectangle around what the world's region, as seen from its goal, is in an image from elsewhere [px], within that
+ * image; empty when nothing of it is there. Of a world without a region, that is the whole image.
  * @param camera world from optical frame.
  */
 cv::Rect regionSeenFrom(const World& world, const Eigen::Isometry3d& camera);

@@ -33,7 +33,9 @@ constexpr char CAMERA_FRAME[] = "camera_optical_frame";
 class FrameNames
 {
 public:
-  /** @param prefix put before names, with a slash between, as robot_state_publisher does; empty: names stay as they are. */
+  /**
+   * @param prefix put before names, with a slash between, as robot_state_publisher does; empty: names stay as they are.
+   */
   explicit FrameNames(const std::string& prefix);
 
   /** The name of a frame with the prefix before it. */

@@ -18,8 +18,9 @@ struct RunProgram
 };
 
 /**
- * Looks at a command line before ROS does, which waits for a master: answers --help, and refuses what is not understood,
- * with one line on standard error. Parameters are words such as _timeout:=60; what else has ":=" is ROS' own.
+ * Looks at a command line before ROS does, which waits for a master: answers --help, and refuses what is not
+ * understood, with one line on standard error. Parameters are words such as _timeout:=60; what else has ":=" is ROS'
+ * own.
  * @param defaults of the parameters.
  * @return the exit status when the program is to end: 0 after --help, 2 when the command line is wrong.
  */

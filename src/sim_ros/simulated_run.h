@@ -287,8 +287,8 @@ private:
   }
 
   /**
-   * Waits until a condition holds for the last two true poses of the camera, both of which came after the call, and returns
-   * the last one. @param what to say when it does not hold in time.
+   * Waits until a condition holds for the last two true poses of the camera, both of which came after the call, and
+   * returns the last one. @param what to say when it does not hold in time.
    */
   Eigen::Isometry3d waitFor(const std::string& what,
                             const std::function<bool(const Eigen::Isometry3d&, const Eigen::Isometry3d&)>& holds)
@@ -356,9 +356,9 @@ inline void endWithRoslaunch()
 }
 
 /**
- * main() of a program that runs a simulated robot once. Its parameters, all private, are those of RunParams. With `~exit`
- * it ends afterwards, with status 0 when the robot is at the view and 1 when not, and roslaunch ends, too, when that has
- * started the program. --help, and a command line that is wrong, are answered without a master.
+ * main() of a program that runs a simulated robot once. Its parameters, all private, are those of RunParams. With
+ * `~exit` it ends afterwards, with status 0 when the robot is at the view and 1 when not, and roslaunch ends, too, when
+ * that has started the program. --help, and a command line that is wrong, are answered without a master.
  *
  * @param params the defaults.
  * @param run does it; an exception counts as a failed run.

@@ -89,8 +89,8 @@ CalibrationStatus finish(const Calibration& calibration, const HandEyePosesFile&
 }
 
 /**
- * Takes poses, and says what to do next, until enough of them agree, it is of no use to go on, or the program is asked to
- * end. @return the calibration by all that were taken.
+ * Takes poses, and says what to do next, until enough of them agree, it is of no use to go on, or the program is asked
+ * to end. @return the calibration by all that were taken.
  */
 template <typename Calibration>
 typename Calibration::Result collectPoses(const Calibration& calibration, HandEyeSession& session)
@@ -185,7 +185,8 @@ CalibrationStatus calibrateAtRobot(Calibration& calibration)
 /**
  * main() of a program that calibrates where a camera is mounted.
  * @tparam Calibration has
- *  - NAME of the program; LAUNCH_ARGUMENTS, the words after "roslaunch view_servo" that are followed by the result's file;
+ *  - NAME of the program; LAUNCH_ARGUMENTS, the words after "roslaunch view_servo" that are followed by the result's
+ *    file;
  *  - options, with all of CalibrationOptions, and readOptions(argc, argv), false when --help was asked for;
  *  - prepare(HandEyePosesFile) and prepare(HandEyeSession), one of which is called first of all;
  *  - params, with min_poses, and calibrate(view, poses), which returns a Result; that has found, message, covariance,

@@ -26,8 +26,9 @@ struct CheckOptions
 };
 
 /**
- * Reads the command line: options, `homing` or `arm_servo`, and arguments NAME:=VALUE as the launch file of that name takes
- * them. Those that do not matter here are passed over. @return nothing when help was asked for, and has been printed.
+ * Reads the command line: options, `homing` or `arm_servo`, and arguments NAME:=VALUE as the launch file of that name
+ * takes them. Those that do not matter here are passed over. @return nothing when help was asked for, and has been
+ * printed.
  * @throws std::runtime_error naming what is wrong, in one line.
  */
 std::optional<CheckOptions> readCheckOptions(int argc, char** argv);

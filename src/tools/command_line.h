@@ -58,8 +58,8 @@ struct NumberRange
 };
 
 /**
- * What a program takes on its command line: options by their long names ("--rate 5" or "--rate=5"), each once but lists,
- * and words without a name. All that is bound has to outlive parse().
+ * What a program takes on its command line: options by their long names ("--rate 5" or "--rate=5"), each once but
+ * lists, and words without a name. All that is bound has to outlive parse().
  */
 class CommandLine
 {

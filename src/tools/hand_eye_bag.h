@@ -10,8 +10,9 @@
 namespace view_servo
 {
 /**
- * The poses at which an arm stood still before a stored view, from a bag that was recorded meanwhile: /tf, /tf_static, the
- * camera's camera_info and the tracker's homographies. What HandEyeSession would have taken is taken, by the same rules.
+ * The poses at which an arm stood still before a stored view, from a bag that was recorded meanwhile: /tf, /tf_static,
+ * the camera's camera_info and the tracker's homographies. What HandEyeSession would have taken is taken, by the same
+ * rules.
  * @throws std::runtime_error naming the bag, and what it lacks or what is wrong with it.
  */
 HandEyePosesFile readHandEyeBag(const std::string& path, const HandEyeSources& sources);

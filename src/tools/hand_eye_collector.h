@@ -24,7 +24,10 @@ HandEyeView handEyeViewOf(const StoredView& stored, const Camera& camera);
 /** x_cur ~ H x_view, as a message has it [px]. */
 Eigen::Matrix3d homographyOf(const Homography& message);
 
-/** Picks, out of what an arm and a tracker say while the arm is brought from pose to pose, the poses at which both stand still. */
+/**
+ * Picks, out of what an arm and a tracker say while the arm is brought from pose to pose, the poses at which both stand
+ * still.
+ */
 class HandEyeCollector
 {
 public:

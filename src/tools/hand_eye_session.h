@@ -40,8 +40,8 @@ struct HandEyeSources
 };
 
 /**
- * Collects poses at which an arm stands still while homography_tracker follows a stored view. Not for several threads at
- * once; messages come by a spinner's thread.
+ * Collects poses at which an arm stands still while homography_tracker follows a stored view. Not for several threads
+ * at once; messages come by a spinner's thread.
  */
 class HandEyeSession
 {

@@ -36,8 +36,8 @@
 
 /** @file
  * `match_images points|lines|scene REF CUR` matches two image files from the command line; `match_images find DIR CUR`
- * says which of many views an image shows. Exit status: 0 a geometry or a view was found, 1 none was found, 2 bad input,
- * with one line on standard error that names the file or option.
+ * says which of many views an image shows. Exit status: 0 a geometry or a view was found, 1 none was found, 2 bad
+ * input, with one line on standard error that names the file or option.
  */
 namespace
 {

@@ -30,7 +30,9 @@ enum class MatchSubcommand
   SCENE
 };
 
-/** What the user of `match_images points|lines|scene REF CUR` wants. The name of a file is empty where none was given. */
+/**
+ * What the user of `match_images points|lines|scene REF CUR` wants. The name of a file is empty where none was given.
+ */
 struct MatchOptions
 {
   std::string reference;              ///< image file of the stored view
@@ -77,7 +79,9 @@ void runWithoutSubcommand(int argc, const char* const* argv);
 /** The grey image of a file; what decoders write on standard error is discarded. @throws std::runtime_error. */
 cv::Mat readImage(const std::string& path);
 
-/** Parameters with the values of --set. @throws std::runtime_error when a name is unknown or a value is out of range. */
+/**
+ * Parameters with the values of --set. @throws std::runtime_error when a name is unknown or a value is out of range.
+ */
 template <typename Params>
 Params paramsWith(const std::vector<std::string>& settings)
 {

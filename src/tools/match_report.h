@@ -33,8 +33,8 @@ class MatchReport
 public:
   /**
    * Looks at what can be told from the options alone, before the images are read.
-   * @param options must outlive the report. @throws std::runtime_error when the overlay's name has no ending of an image,
-   * or the true homography cannot be read.
+   * @param options must outlive the report. @throws std::runtime_error when the overlay's name has no ending of an
+   * image, or the true homography cannot be read.
    */
   explicit MatchReport(const MatchOptions& options);
 

@@ -503,7 +503,7 @@ int main(int argc, char** argv)
   {
     std::cerr << "record_bag: " << oneLine(error) << std::endl;
   }
-  // Not by the end of main(): a BagWriter may have had to keep a bag that cannot be closed, which class_loader of ROS 1.17,
-  // when rosbag's plugins are unloaded, has a line about after that of the error.
+  // Not by the end of main(): a BagWriter may have had to keep a bag that cannot be closed, which class_loader of ROS
+  // 1.17, when rosbag's plugins are unloaded, has a line about after that of the error.
   std::_Exit(BAD_INPUT);
 }

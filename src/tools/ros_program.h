@@ -14,8 +14,8 @@ namespace view_servo
 /** @file How command-line programs that use ROS begin. */
 
 /**
- * As CommandLine::parse(), of the words that are not for ROS, such as "camera:=/front" or "__ns:=/robot1". Needs neither
- * ros::init() nor a master.
+ * As CommandLine::parse(), of the words that are not for ROS, such as "camera:=/front" or "__ns:=/robot1". Needs
+ * neither ros::init() nor a master.
  */
 std::optional<std::vector<std::string>> parseWithoutRosWords(CommandLine& line, int argc, char** argv);
 

@@ -31,15 +31,17 @@ struct HandEyeTrialParams
 };
 
 /**
- * Hand-eye calibration of the simulated arm from a stored view and poses drawn at random around the goal. The view is found in
- * the images, followed in them, and averaged while the arm stands, as homography_tracker and calibrate_hand_eye do. For the same
- * seed and errors the true camera is where ArmTrials has it.
+ * Hand-eye calibration of the simulated arm from a stored view and poses drawn at random around the goal. The view is
+ * found in the images, followed in them, and averaged while the arm stands, as homography_tracker and
+ * calibrate_hand_eye do. For the same seed and errors the true camera is where ArmTrials has it.
  */
 class HandEyeTrial
 {
 public:
-  /** @param world of the arm. @throws std::invalid_argument and std::runtime_error as SimulatedCamera and Puma do, and when the
-   * view shows nothing. */
+  /**
+   * @param world of the arm. @throws std::invalid_argument and std::runtime_error as SimulatedCamera and Puma do, and
+   * when the view shows nothing.
+   */
   HandEyeTrial(const World& world, const std::string& urdf_xml, const HandEyeTrialParams& params);
 
   /** Calibrates once more, from other poses. @throws what calibrateHandEye() throws. */

@@ -25,8 +25,8 @@ struct RouteTrialParams
   RouteSpacingParams spacing;
   VelocityLimits limits;
   /**
-   * What makes it harder, of which only the noise of images, the errors of odometry and the light are used: the light while
-   * the route is followed, the others while it is recorded, too.
+   * What makes it harder, of which only the noise of images, the errors of odometry and the light are used: the light
+   * while the route is followed, the others while it is recorded, too.
    */
   HomingConditions conditions;
   double matching_period = 0.2;  ///< between two images that are matched by points [s], > 0
@@ -51,8 +51,8 @@ struct RouteOutcome
 };
 
 /**
- * Records a route in a simulated world, driving straight from one waypoint to the next, and follows it, in one process and
- * with the classes and delays of the nodes.
+ * Records a route in a simulated world, driving straight from one waypoint to the next, and follows it, in one process
+ * and with the classes and delays of the nodes.
  * @param waypoints poses of the base in the world, at least two. @param start where it is put to follow the route.
  * @throws std::invalid_argument naming faults of the parameters, or what stands in the way.
  */

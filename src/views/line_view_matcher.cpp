@@ -404,7 +404,9 @@ void reportFundamental(ViewMatch& result)
                    plural(result.matches.size(), "intersection") + " agree with one fundamental matrix";
 }
 
-/** The fundamental matrix of the intersections, best first, or of two planes, if it stands without any of the planes. */
+/**
+ * The fundamental matrix of the intersections, best first, or of two planes, if it stands without any of the planes.
+ */
 std::optional<Eigen::Matrix3d> fundamentalOf(const Correspondences& points, const SegmentPairs& lines,
                                              const LinePlanes& planes, const LineMatcherParams& params, Rng& rng)
 {

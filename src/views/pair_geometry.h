@@ -86,8 +86,8 @@ public:
   virtual Eigen::Matrix3d refine(const Eigen::Matrix3d& matrix, const Correspondences& pairs) const = 0;
 
   /**
-   * The matrix, or one near it, that the candidates determine; empty when they leave it open, as those of one plane leave
-   * a fundamental matrix. @param candidates all pairs, right and wrong, the most trustworthy first.
+   * The matrix, or one near it, that the candidates determine; empty when they leave it open, as those of one plane
+   * leave a fundamental matrix. @param candidates all pairs, right and wrong, the most trustworthy first.
    */
   virtual std::optional<Eigen::Matrix3d> settle(const Eigen::Matrix3d& matrix, const Correspondences& candidates,
                                                 Rng& rng) const = 0;
@@ -114,7 +114,9 @@ public:
   /** The matches, old and new, that are found where the matrix says that reference corners are. */
   virtual std::vector<CornerMatch> findAlong(const Eigen::Matrix3d& matrix, const LevelData& level) const = 0;
 
-  /** The matrix between two levels as one between the full images. The maps take pixels of a level to the full image. */
+  /**
+   * The matrix between two levels as one between the full images. The maps take pixels of a level to the full image.
+   */
   virtual Eigen::Matrix3d ofFullImages(const Eigen::Matrix3d& matrix, const Eigen::Matrix3d& reference_to_full,
                                        const Eigen::Matrix3d& current_to_full) const = 0;
 

@@ -58,18 +58,19 @@ struct LevelTrial
   double min_significance;  ///< that a geometry must have to end the search
 };
 
-// A geometry from a quick search, or from a share of the profiles, ends the search only if it is beyond doubt, as most are; in
-// the others the rest of the profiles may find a better one.
+// A geometry from a quick search, or from a share of the profiles, ends the search only if it is beyond doubt, as most
+// are; in the others the rest of the profiles may find a better one.
 constexpr double BEYOND_DOUBT = 10.0;  // times the significance asked for
 
-// A symmetric thing that matches in a mirrored image does so with less than this significance or, where it is large, with
-// much around it that does not match.
+// A symmetric thing that matches in a mirrored image does so with less than this significance or, where it is large,
+// with much around it that does not match.
 constexpr double POINTS_BEYOND_MIRRORS = 60.0;
 constexpr double MOST_CANDIDATES = 0.5;
 
 /**
- * How much better the best associations of some reference corners are than their second best, summed up over the corners
- * where this is most: where two images show the same, a few associations stand out, however many corners there are.
+ * How much better the best associations of some reference corners are than their second best, summed up over the
+ * corners where this is most: where two images show the same, a few associations stand out, however many corners there
+ * are.
  */
 double distinctness(const AssociationMatrix& association, std::size_t rows)
 {
@@ -89,8 +90,8 @@ double distinctness(const AssociationMatrix& association, std::size_t rows)
 }
 
 /**
- * What to compare, one after the other: first the full images, quickly and then thoroughly. Where that finds nothing, the other
- * scales and sides get a quick look each, and those that promise most are compared thoroughly.
+ * What to compare, one after the other: first the full images, quickly and then thoroughly. Where that finds nothing,
+ * the other scales and sides get a quick look each, and those that promise most are compared thoroughly.
  */
 class TrialQueue
 {
@@ -148,7 +149,9 @@ private:
     return levels;
   }
 
-  /** Those whose associations stand out most: of 33 planes that only other scales or sides show, the first one did 29. */
+  /**
+   * Those whose associations stand out most: of 33 planes that only other scales or sides show, the first one did 29.
+   */
   std::vector<LevelPair> promisingLevels() const
   {
     constexpr std::size_t MOST = 2;
@@ -239,7 +242,9 @@ public:
     return from_.corners.size() >= MIN_CORNERS && to_.corners.size() >= MIN_CORNERS;
   }
 
-  /** Associates, chooses candidates, fits, finds more matches and checks; true when there is a geometry to be believed. */
+  /**
+   * Associates, chooses candidates, fits, finds more matches and checks; true when there is a geometry to be believed.
+   */
   bool run(ViewMatch& result, StageClock& clock, Rng& rng)
   {
     associate(clock, rng);
@@ -464,7 +469,9 @@ private:
     return plane;
   }
 
-  /** Whether what agrees with the geometry is found elsewhere nearly as well, in the full images: periods may be small. */
+  /**
+   * Whether what agrees with the geometry is found elsewhere nearly as well, in the full images: periods may be small.
+   */
   bool isRepeated(const Eigen::Matrix3d& plane) const
   {
     Correspondences pairs;
@@ -478,9 +485,9 @@ private:
   }
 
   /**
-   * Of the reference corners whose candidates agree with the geometry: the part that agrees, too, of the other places that look
-   * nearly as much like them. On tiles or windows in rows these are places a number of periods off; and where an epipolar
-   * line runs along a row, it passes many of them, whether it is right or not.
+   * Of the reference corners whose candidates agree with the geometry: the part that agrees, too, of the other places
+   * that look nearly as much like them. On tiles or windows in rows these are places a number of periods off; and where
+   * an epipolar line runs along a row, it passes many of them, whether it is right or not.
    */
   double partOfRivals() const
   {

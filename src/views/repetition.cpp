@@ -117,8 +117,8 @@ private:
 };
 
 /**
- * Some matches that are found along one homography, to be found again along another. Those that are not found there would
- * not be found elsewhere either, and tell nothing.
+ * Some matches that are found along one homography, to be found again along another. Those that are not found there
+ * would not be found elsewhere either, and tell nothing.
  */
 class Matches
 {

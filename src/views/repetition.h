@@ -22,8 +22,8 @@ constexpr const char* REPEATED =
  * What a plane shows may be there more than once: tiles, bricks, windows, a grid. Then a homography that is one period
  * off fits nearly as well as the right one, and which of them is right cannot be told.
  *
- * Where the current image looks alike around two places, the homography is tried that sends to the one what `h` sends to
- * the other; it is fitted to the corners around that are found along it, then to all.
+ * Where the current image looks alike around two places, the homography is tried that sends to the one what `h` sends
+ * to the other; it is fitted to the corners around that are found along it, then to all.
  * @param reference, current 8-bit, one channel.
  * @param matches that agree with `h`, x_cur ~ H x_ref [px].
  * @param current_corners places in the current image where what is there more than once may be found again.

@@ -240,8 +240,8 @@ std::vector<GuidedMatch> SceneGeometry::search(const std::vector<Corner>& corner
 }
 
 /**
- * Corners off the planes that are seen not far from where one would show them: they say most of the parallax. Each has to
- * be found again from the current image, which fails where something else there looks more like it.
+ * Corners off the planes that are seen not far from where one would show them: they say most of the parallax. Each has
+ * to be found again from the current image, which fails where something else there looks more like it.
  */
 void SceneGeometry::addMatchesNear(const Eigen::Matrix3d& h)
 {
@@ -381,8 +381,8 @@ double SceneGeometry::significanceOf(const Eigen::Matrix3d& f) const
 }
 
 /**
- * Keeps a fundamental matrix, or one of its best plane and the parallax off it, if that is the best so far. Where little
- * lies far off the plane, what lies near it is told from it by half the threshold.
+ * Keeps a fundamental matrix, or one of its best plane and the parallax off it, if that is the best so far. Where
+ * little lies far off the plane, what lies near it is told from it by half the threshold.
  */
 void SceneGeometry::consider(const Eigen::Matrix3d& hypothesis)
 {
@@ -421,8 +421,8 @@ void SceneGeometry::weigh(const Eigen::Matrix3d& hypothesis, const Plane& plane,
   {
     const double held = parallax.significance(choice) - tests;
     const double significance = significanceOf(choice);
-    // A plane that is beyond doubt and what its parallax says determine a fundamental matrix as well as all matches do; but
-    // what lies near a plane may be off it because the plane does not fit.
+    // A plane that is beyond doubt and what its parallax says determine a fundamental matrix as well as all matches do;
+    // but what lies near a plane may be off it because the plane does not fit.
     const bool off_plane = isBeyondDoubt(&plane) && tolerance >= params_.inlier_threshold;
     const double evidence = off_plane ? std::max(significance, held) : significance;
     const double margin = std::min(held - params_.points.min_log_parallax, evidence - params_.min_log_significance);

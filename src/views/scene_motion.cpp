@@ -36,8 +36,8 @@ std::optional<SceneMotion> sceneMotion(const ViewMatch& match, const Camera& ref
   constexpr std::size_t FEWEST = 15;
   constexpr double THRESHOLD = 1.5;  // of a match that agrees [px]
   constexpr double NOISE = 0.3;      // least standard deviation of a match [px]
-  // Lenses and shutters are never quite as calibrated: matches of one part of the picture err alike. On real walks motions
-  // err as if so many matches were independent, however many there are.
+  // Lenses and shutters are never quite as calibrated: matches of one part of the picture err alike. On real walks
+  // motions err as if so many matches were independent, however many there are.
   constexpr double INDEPENDENT = 9.0;
   requireUsable(reference, "reference");
   requireUsable(current, "current");

@@ -52,8 +52,9 @@ std::vector<std::string> namesOfYamlFiles(const std::filesystem::path& directory
 void syncDirectory(const std::filesystem::path& directory);
 
 /**
- * After this the file holds either what it held before or all of `bytes`, whatever happens in between. Its directory has to
- * be synced before it is certain which of the two. The bytes are written beside it first, to its name with ".tmp" appended.
+ * After this the file holds either what it held before or all of `bytes`, whatever happens in between. Its directory
+ * has to be synced before it is certain which of the two. The bytes are written beside it first, to its name with
+ * ".tmp" appended.
  * @throws std::system_error.
  */
 void replaceFile(const std::filesystem::path& path, std::string_view bytes);

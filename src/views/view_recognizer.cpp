@@ -77,8 +77,8 @@ ViewSource storedViews(const ViewStore& store)
   };
   const auto listed = std::make_shared<Listed>();
   const auto revisions = [store, listed] {
-    // Each change of a store renames or removes a file, by which the directory's time changes. It is believed once it is
-    // so old that a change after the listing has another time.
+    // Each change of a store renames or removes a file, by which the directory's time changes. It is believed once it
+    // is so old that a change after the listing has another time.
     constexpr std::chrono::seconds SETTLED(2);
     const std::lock_guard<std::mutex> lock(listed->mutex);
     std::error_code missing;

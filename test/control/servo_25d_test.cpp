@@ -129,7 +129,9 @@ private:
   std::deque<PlaneView> images_;
 };
 
-/** A camera that sees the chosen point somewhere in its image, turned by up to 60 degrees about its axis and 40 across. */
+/**
+ * A camera that sees the chosen point somewhere in its image, turned by up to 60 degrees about its axis and 40 across.
+ */
 Eigen::Isometry3d randomCamera(Rng& rng, const Eigen::Vector3d& normal)
 {
   while (true)

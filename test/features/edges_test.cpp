@@ -24,7 +24,9 @@ using view_servo::test::disturbed;
 using view_servo::test::drawnPicture;
 using view_servo::test::texturedPicture;
 
-/** Brighter by `contrast` on one side of the line through (40.3, 39.8) than on the other; `angle` of the line's normal. */
+/**
+ * Brighter by `contrast` on one side of the line through (40.3, 39.8) than on the other; `angle` of the line's normal.
+ */
 cv::Mat straightEdge(double angle, double contrast)
 {
   const Eigen::Vector2d normal(std::cos(angle), std::sin(angle));

@@ -309,8 +309,10 @@ protected:
     return last && last->header.stamp == stamp ? last : std::nullopt;
   }
 
-  /** Publishes an image at its time, however long the matchers work on it; again after a while, as the first may come before
-   * its time does. */
+  /**
+   * Publishes an image at its time, however long the matchers work on it; again after a while, as the first may come
+   * before its time does.
+   */
   void show(const CameraMessages& messages)
   {
     const ros::WallDuration patience(2.0 * SLOWDOWN);

@@ -57,7 +57,8 @@ inline std::vector<double> extremeNumbers()
 }
 
 /**
- * What fake robots share: a thread that publishes at a rate, and the view that the driver wants. Each flag lets something fail.
+ * What fake robots share: a thread that publishes at a rate, and the view that the driver wants. Each flag lets
+ * something fail.
  */
 class FakeRobot
 {
@@ -249,7 +250,9 @@ protected:
     ASSERT_TRUE(waitUntil([this] { return commands_.moving(); })) << reason();
   }
 
-  /** The same after extreme messages: the last of them may come only when the goal has begun, and end it by its reason. */
+  /**
+   * The same after extreme messages: the last of them may come only when the goal has begun, and end it by its reason.
+   */
   void driveAfterExtremes()
   {
     send("goal");
@@ -427,7 +430,10 @@ protected:
   CommandsOf<typename Robot::Command> real_commands_{ "dry/cmd_vel" };
 };
 
-/** main() of a driver's test. @param make the view that goals name "goal". @param node whose directory of views it goes to. */
+/**
+ * main() of a driver's test. @param make the view that goals name "goal". @param node whose directory of views it goes
+ * to.
+ */
 inline int runDriverTests(int argc, char** argv, const std::string& name, const std::string& node,
                           const std::function<StoredView()>& make)
 {

@@ -1,7 +1,10 @@
 // Copyright (c) 2026, the view_servo authors
 // SPDX-License-Identifier: BSD-3-Clause
 
-/** @file A view that is saved with learn: true is learnt while the base is driven away from it, and used by the next goal. */
+/**
+ * @file A view that is saved with learn: true is learnt while the base is driven away from it, and used by the next
+ * goal.
+ */
 #include "simulated_base_test.h"
 
 #include "view_servo/Heading.h"

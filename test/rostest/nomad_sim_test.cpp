@@ -59,7 +59,8 @@ TEST_F(NomadSimNodeTest, OdometryTfAndGroundTruthTellOfOneMotion)
   EXPECT_GT(true_motion.translation().norm(), 0.2);
   EXPECT_LT((true_motion.translation() - tf_motion.translation()).norm(), 0.005);
   EXPECT_LT(Eigen::AngleAxisd(true_motion.linear().transpose() * tf_motion.linear()).angle(), 0.003);
-  // Forward is along the optical axis, left is against the image's u axis; a turn to the left moves things to the right.
+  // Forward is along the optical axis, left is against the image's u axis; a turn to the left moves things to the
+  // right.
   EXPECT_GT(true_motion.translation().z(), 0.15);
   EXPECT_GT(true_motion.translation().x(), 0.05);
   EXPECT_NEAR(true_motion.translation().y(), 0.0, 1e-9);

@@ -1,8 +1,8 @@
 // Copyright (c) 2026, the view_servo authors
 // SPDX-License-Identifier: BSD-3-Clause
 // Part of the core in a build with ThreadSanitizer, which does not see how the threads of OpenCV's TBB hand work on. So
-// cv::parallel_for_() starts threads of the standard library instead, and joins them; where OpenCV (before 4.5.2) cannot
-// be told to, it uses one.
+// cv::parallel_for_() starts threads of the standard library instead, and joins them; where OpenCV (before 4.5.2)
+// cannot be told to, it uses one.
 #include <opencv2/core/utility.hpp>
 
 #if __has_include(<opencv2/core/parallel/parallel_backend.hpp>)

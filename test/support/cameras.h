@@ -39,7 +39,8 @@ inline Eigen::Matrix3d crossMatrix(const Eigen::Vector3d& v)
 }
 
 /**
- * The fundamental matrix of two views, x_current^T F x_reference = 0, as Longuet-Higgins has it: made by nothing that is tested.
+ * The fundamental matrix of two views, x_current^T F x_reference = 0, as Longuet-Higgins has it: made by nothing that
+ * is tested.
  * @param r,t the motion X_current = R X_reference + t.
  */
 inline Eigen::Matrix3d fundamentalOf(const Eigen::Matrix3d& k_reference, const Eigen::Matrix3d& k_current,

@@ -41,7 +41,9 @@ inline cv::Mat texturedPicture(std::uint64_t seed, const cv::Size& size = cv::Si
   return blurred;
 }
 
-/** Noise blurred by `sigma` px, 8-bit: its corners, unlike those of texturedPicture(), are others in a reduced image. */
+/**
+ * Noise blurred by `sigma` px, 8-bit: its corners, unlike those of texturedPicture(), are others in a reduced image.
+ */
 inline cv::Mat blotchedPicture(std::uint64_t seed, double sigma, const cv::Size& size = cv::Size(480, 360))
 {
   cv::Mat noise(size, CV_32F);
@@ -60,7 +62,9 @@ inline Eigen::Matrix3d exampleHomography()
   return h;
 }
 
-/** The picture seen through `h` (picture -> result), on grey ground. @param size of the result; without: the picture's. */
+/**
+ * The picture seen through `h` (picture -> result), on grey ground. @param size of the result; without: the picture's.
+ */
 inline cv::Mat warpedPicture(const cv::Mat& picture, const Eigen::Matrix3d& h, const cv::Size& size)
 {
   cv::Mat matrix;

@@ -81,7 +81,10 @@ void expectAtView(const Path& path)
   EXPECT_LT(path.outcome.rotation_error, ROTATION_REACHED);
 }
 
-/** With noise in images and encoders, and a hand-eye calibration that is off by WRONG_BY and TURNED_BY in some direction. */
+/**
+ * With noise in images and encoders, and a hand-eye calibration that is off by WRONG_BY and TURNED_BY in some
+ * direction.
+ */
 struct HandEyeRun
 {
   const char* world;

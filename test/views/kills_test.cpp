@@ -1,6 +1,7 @@
 // Copyright (c) 2026, the view_servo authors
 // SPDX-License-Identifier: BSD-3-Clause
-// Two processes write views, structure and routes in one folder and are killed at random moments, while a third one reads.
+// Two processes write views, structure and routes in one folder and are killed at random moments, while a third one
+// reads.
 #include "view_store_test.h"
 
 #include "view_servo/views/route_store.h"
@@ -139,7 +140,9 @@ protected:
     return "r" + std::to_string(writer) + "_" + std::to_string(number);
   }
 
-  /** Saves without end, from a number on, and says so. The route of the number before goes when the new one is there. */
+  /**
+   * Saves without end, from a number on, and says so. The route of the number before goes when the new one is there.
+   */
   void write(int writer, int first, int pipe) const
   {
     const auto say = [&](char what, int number) {

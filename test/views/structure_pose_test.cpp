@@ -23,7 +23,9 @@ void expectNear(const Eigen::Isometry3d& pose, const Eigen::Isometry3d& truth, d
   EXPECT_LT(Eigen::AngleAxisd(pose.linear().transpose() * truth.linear()).angle(), radians);
 }
 
-/** Of a camera that is tilted by `pitch` (downwards) when the view is taken, and then moves as `view_from_current` says. */
+/**
+ * Of a camera that is tilted by `pitch` (downwards) when the view is taken, and then moves as `view_from_current` says.
+ */
 struct Walk
 {
   StoredView view;
