@@ -118,10 +118,10 @@ std::vector<std::string> ViewIndexParams::validate() const
   return faultsOf(*this);
 }
 
-ViewIndex::ViewIndex(const ViewIndexParams& params) : params_(params), nodes_(1)
+ViewIndex::ViewIndex(const ViewIndexParams& params) : params_(params), nodes_(1), leaves_(1)
 {
   requireNoFaults("parameters of the view index", params.validate());
-  nodes_.front().limit = static_cast<std::uint32_t>(params_.leaf_words);
+  leaves_.front().limit = static_cast<std::uint32_t>(params_.leaf_words);
 }
 
 std::uint32_t ViewIndex::leafOf(const BinaryWord& word) const
@@ -141,7 +141,7 @@ std::uint32_t ViewIndex::leafOf(const BinaryWord& word) const
 void ViewIndex::insert(std::uint32_t leaf, const Entry& entry)
 {
   constexpr std::size_t STEP = 4;  // memory for this many words is allocated at a time: doubling would waste too much
-  std::vector<Entry>& entries = nodes_[leaf].entries;
+  std::vector<Entry>& entries = leaves_[leaf].entries;
   if (entries.size() == entries.capacity())
   {
     entries.reserve(entries.size() + std::max(STEP, entries.size() / 8));
@@ -152,7 +152,7 @@ void ViewIndex::insert(std::uint32_t leaf, const Entry& entry)
 void ViewIndex::divide(std::uint32_t leaf)
 {
   constexpr int ROUNDS = 3;
-  const std::vector<Entry>& entries = nodes_[leaf].entries;
+  const std::vector<Entry>& entries = leaves_[leaf].entries;
   std::vector<BinaryWord> centres = spread(entries, static_cast<std::size_t>(params_.branches));
   const auto centre = [&](std::size_t i) -> const BinaryWord& {
     return centres[i];
@@ -178,11 +178,11 @@ void ViewIndex::divide(std::uint32_t leaf)
   }
   if (*std::max_element(sizes.begin(), sizes.end()) == entries.size())
   {
-    nodes_[leaf].limit *= 2;  // equal words, or nearly: there is nothing to divide before there are many more
+    leaves_[leaf].limit *= 2;  // equal words, or nearly: there is nothing to divide before there are many more
     return;
   }
-  const std::vector<Entry> divided = std::move(nodes_[leaf].entries);
-  nodes_[leaf].entries = std::vector<Entry>();
+  const std::vector<Entry> divided = std::move(leaves_[leaf].entries);
+  leaves_[leaf].entries = std::vector<Entry>();
   const auto first = static_cast<std::uint32_t>(nodes_.size());
   nodes_[leaf].first_child = first;
   nodes_[leaf].children = static_cast<std::uint32_t>(centres.size());
@@ -190,12 +190,13 @@ void ViewIndex::divide(std::uint32_t leaf)
   {
     nodes_.emplace_back();
     nodes_.back().centre = centres[i];
-    nodes_.back().limit = static_cast<std::uint32_t>(params_.leaf_words);
-    nodes_.back().entries.reserve(sizes[i]);
+    leaves_.emplace_back();
+    leaves_.back().limit = static_cast<std::uint32_t>(params_.leaf_words);
+    leaves_.back().entries.reserve(sizes[i]);
   }
   for (std::size_t i = 0; i < divided.size(); ++i)
   {
-    nodes_[first + part_of[i]].entries.push_back(divided[i]);
+    leaves_[first + part_of[i]].entries.push_back(divided[i]);
   }
 }
 
@@ -225,7 +226,7 @@ void ViewIndex::add(const std::string& name, const std::vector<BinaryFeature>& f
   {
     const std::uint32_t leaf = leafOf(feature.word);
     insert(leaf, { feature.word, slot, feature.angle });
-    if (nodes_[leaf].entries.size() > nodes_[leaf].limit)
+    if (leaves_[leaf].entries.size() > leaves_[leaf].limit)
     {
       divide(leaf);
     }
@@ -240,11 +241,11 @@ bool ViewIndex::remove(const std::string& name)
     return false;
   }
   const std::uint32_t slot = found->second;
-  for (Node& node : nodes_)
+  for (Leaf& leaf : leaves_)
   {
-    node.entries.erase(std::remove_if(node.entries.begin(), node.entries.end(),
+    leaf.entries.erase(std::remove_if(leaf.entries.begin(), leaf.entries.end(),
                                       [slot](const Entry& entry) { return entry.view == slot; }),
-                       node.entries.end());
+                       leaf.entries.end());
   }
   slots_.erase(found);
   views_[slot] = View();
@@ -252,19 +253,31 @@ bool ViewIndex::remove(const std::string& name)
   return true;
 }
 
-/** What the features of one query find. */
+/**
+ * What the features of one query find. In a large index nearly all of the time is spent on waiting for memory. So the ways
+ * of several words through the tree alternate, and what each reads next is fetched meanwhile.
+ */
 class ViewIndex::Search
 {
 public:
-  explicit Search(const ViewIndex& index) : index_(index), votes_(index.views_.size()), nearest_(index.views_.size())
+  explicit Search(const ViewIndex& index)
+    : index_(index), weights_(weights(index.params_)), votes_(index.views_.size()), nearest_(index.views_.size())
   {
   }
 
-  void add(const BinaryFeature& feature)
+  void add(const std::vector<BinaryFeature>& features)
   {
-    seen_.clear();
-    compare(feature);
-    vote();
+    for (std::size_t begin = 0; begin < features.size(); begin += walks_.size())
+    {
+      const std::size_t count = std::min(walks_.size(), features.size() - begin);
+      findLeaves(&features[begin], count);
+      for (std::size_t i = 0; i < count; ++i)
+      {
+        seen_.clear();
+        compare(features[begin + i], walks_[i].leaves);
+        vote();
+      }
+    }
   }
 
   /** The votes that agree on a turn of the image. */
@@ -280,56 +293,107 @@ public:
   }
 
 private:
-  static constexpr int FAR = std::numeric_limits<int>::max();
+  static constexpr std::uint8_t FAR = std::numeric_limits<std::uint8_t>::max();  // farther than any max_distance
 
   struct Similar
   {
-    int distance = FAR;
+    std::uint8_t distance = FAR;
     std::uint8_t turn = 0;
   };
 
-  /** Compares the word with those of the nearest leaves, nearest first, until enough have been compared. */
-  void compare(const BinaryFeature& feature)
+  /** Nodes that wait, with their distances; a heap. */
+  using Queue = std::vector<std::pair<int, std::uint32_t>>;
+
+  /** The way of one word through the tree. */
+  struct Walk
   {
-    const BinaryWord& word = feature.word;
-    const auto enough = static_cast<std::size_t>(index_.params_.checked_words);
-    std::size_t compared = 0;
-    queue_.clear();
-    queue_.emplace_back(0, 0);
-    while (!queue_.empty() && compared < enough)
+    std::uint32_t at = 0;  // the node where it is
+    bool ended = false;
+    std::size_t words = 0;              // in `leaves`
+    std::vector<std::uint32_t> leaves;  // the nearest ones, nearest first
+    Queue queue;
+
+    void restart()
     {
-      std::pop_heap(queue_.begin(), queue_.end(), std::greater<>());
-      std::uint32_t at = queue_.back().second;
-      queue_.pop_back();
-      while (index_.nodes_[at].first_child != 0)
-      {
-        at = descend(word, index_.nodes_[at]);
-      }
-      for (const Entry& entry : index_.nodes_[at].entries)
-      {
-        const int distance = hammingDistance(word, entry.word);
-        if (distance <= index_.params_.max_distance)
-        {
-          Similar& nearest = nearest_[entry.view];
-          if (nearest.distance == FAR)
-          {
-            seen_.push_back(entry.view);
-          }
-          if (distance < nearest.distance)
-          {
-            nearest = { distance, static_cast<std::uint8_t>(entry.angle - feature.angle) };
-          }
-        }
-      }
-      compared += index_.nodes_[at].entries.size();
+      at = 0;
+      ended = false;
+      words = 0;
+      leaves.clear();
+      queue.clear();
+    }
+  };
+
+  /** What a word counts by its distance, up to the largest one. */
+  static std::vector<double> weights(const ViewIndexParams& params)
+  {
+    const double deviation = params.max_distance / 3.0;  // of the distances of words of one patch [bits]
+    std::vector<double> result;
+    for (int distance = 0; distance <= params.max_distance; ++distance)
+    {
+      const double ratio = distance / deviation;
+      result.push_back(std::exp(-0.5 * ratio * ratio));
+    }
+    return result;
+  }
+
+  /** Has memory read ahead of its use; changes no result. */
+  static void fetch(const void* data, std::size_t bytes)
+  {
+    constexpr std::size_t CACHE_LINE = 64;
+    for (std::size_t at = 0; at < bytes; at += CACHE_LINE)
+    {
+      __builtin_prefetch(static_cast<const char*>(data) + at);
     }
   }
 
+  /** Finds the nearest leaves of `count` words, each as many as have enough words to compare with. */
+  void findLeaves(const BinaryFeature* features, std::size_t count)
+  {
+    std::for_each(walks_.begin(), walks_.end(), [](Walk& walk) { walk.restart(); });
+    for (bool all_ended = false; !all_ended;)
+    {
+      all_ended = true;
+      for (std::size_t i = 0; i < count; ++i)
+      {
+        if (!walks_[i].ended)
+        {
+          step(features[i].word, walks_[i]);
+          all_ended = false;
+        }
+      }
+    }
+  }
+
+  /** Goes to the nearest child of a node, or from a leaf to the nearest node that waits. */
+  void step(const BinaryWord& word, Walk& walk) const
+  {
+    const Node& node = index_.nodes_[walk.at];
+    if (node.first_child != 0)
+    {
+      walk.at = descend(word, node, walk.queue);
+    }
+    else
+    {
+      walk.leaves.push_back(walk.at);
+      walk.words += index_.leaves_[walk.at].entries.size();
+      walk.ended = walk.queue.empty() || walk.words >= static_cast<std::size_t>(index_.params_.checked_words);
+      if (walk.ended)
+      {
+        return;
+      }
+      std::pop_heap(walk.queue.begin(), walk.queue.end(), std::greater<>());
+      walk.at = walk.queue.back().second;
+      walk.queue.pop_back();
+    }
+    const Node& next = index_.nodes_[walk.at];
+    fetch(&index_.nodes_[next.first_child], next.children * sizeof(Node));
+  }
+
   /** The nearest child; the others are put in the queue. */
-  std::uint32_t descend(const BinaryWord& word, const Node& node)
+  std::uint32_t descend(const BinaryWord& word, const Node& node, Queue& queue) const
   {
     std::uint32_t best = NONE;
-    int least = FAR;
+    int least = std::numeric_limits<int>::max();
     for (std::uint32_t child = node.first_child; child < node.first_child + node.children; ++child)
     {
       const int distance = hammingDistance(word, index_.nodes_[child].centre);
@@ -341,41 +405,71 @@ private:
       }
       if (other.second != NONE)
       {
-        queue_.push_back(other);
-        std::push_heap(queue_.begin(), queue_.end(), std::greater<>());
+        queue.push_back(other);
+        std::push_heap(queue.begin(), queue.end(), std::greater<>());
       }
     }
     return best;
+  }
+
+  /** Compares a word with those of leaves. */
+  void compare(const BinaryFeature& feature, const std::vector<std::uint32_t>& leaves)
+  {
+    constexpr std::size_t AHEAD = 2;  // so many leaves are fetched ahead
+    const BinaryWord word = feature.word;
+    const int most = index_.params_.max_distance;
+    for (std::size_t i = 0; i < leaves.size(); ++i)
+    {
+      if (i + AHEAD < leaves.size())
+      {
+        const std::vector<Entry>& later = index_.leaves_[leaves[i + AHEAD]].entries;
+        fetch(later.data(), later.size() * sizeof(Entry));
+      }
+      for (const Entry& entry : index_.leaves_[leaves[i]].entries)
+      {
+        const int distance = hammingDistance(word, entry.word);
+        if (distance > most)
+        {
+          continue;
+        }
+        Similar& nearest = nearest_[entry.view];
+        if (nearest.distance == FAR)
+        {
+          seen_.push_back(entry.view);
+          fetch(&votes_[entry.view], 1);
+        }
+        if (distance < nearest.distance)
+        {
+          nearest = { static_cast<std::uint8_t>(distance), static_cast<std::uint8_t>(entry.angle - feature.angle) };
+        }
+      }
+    }
   }
 
   void vote()
   {
     const double rarity =
         std::log(1.0 + static_cast<double>(index_.slots_.size()) / (1.0 + static_cast<double>(seen_.size())));
-    const double deviation = index_.params_.max_distance / 3.0;  // of the distances of words of one patch [bits]
     for (const std::uint32_t view : seen_)
     {
-      const double ratio = nearest_[view].distance / deviation;
-      votes_[view][nearest_[view].turn * TURNS / 256] +=
-          static_cast<float>(rarity * rarity * std::exp(-0.5 * ratio * ratio));
+      const Similar nearest = nearest_[view];
+      votes_[view][nearest.turn * TURNS / 256] += static_cast<float>(rarity * rarity * weights_[nearest.distance]);
       nearest_[view] = Similar();
     }
   }
 
   const ViewIndex& index_;
-  std::vector<std::array<float, TURNS>> votes_;       // of each view, by the turn between the images
-  std::vector<Similar> nearest_;                      // of each view: its most similar word
-  std::vector<std::uint32_t> seen_;                   // views with a similar word
-  std::vector<std::pair<int, std::uint32_t>> queue_;  // nodes that wait, with their distances; a heap
+  const std::vector<double> weights_;
+  std::array<Walk, 8> walks_;
+  std::vector<std::array<float, TURNS>> votes_;  // of each view, by the turn between the images
+  std::vector<Similar> nearest_;                 // of each view: its most similar word
+  std::vector<std::uint32_t> seen_;              // views with a similar word
 };
 
 std::vector<ScoredView> ViewIndex::query(const std::vector<BinaryFeature>& features, std::size_t most) const
 {
   Search search(*this);
-  for (const BinaryFeature& feature : features)
-  {
-    search.add(feature);
-  }
+  search.add(features);
   std::vector<std::pair<double, std::uint32_t>> found;
   for (std::uint32_t view = 0; view < views_.size(); ++view)
   {
@@ -421,10 +515,11 @@ std::size_t ViewIndex::size() const
 
 std::size_t ViewIndex::memory() const
 {
-  std::size_t bytes = nodes_.capacity() * sizeof(Node) + views_.capacity() * sizeof(View);
-  for (const Node& node : nodes_)
+  std::size_t bytes =
+      nodes_.capacity() * sizeof(Node) + leaves_.capacity() * sizeof(Leaf) + views_.capacity() * sizeof(View);
+  for (const Leaf& leaf : leaves_)
   {
-    bytes += node.entries.capacity() * sizeof(Entry);
+    bytes += leaf.entries.capacity() * sizeof(Entry);
   }
   return bytes;
 }
@@ -556,14 +651,16 @@ void ViewIndex::save(std::ostream& stream) const
   out.put(static_cast<std::uint32_t>(free_.size()));
   out.put(free_.data(), free_.size());
   out.put(static_cast<std::uint32_t>(nodes_.size()));
-  for (const Node& node : nodes_)
+  for (std::size_t at = 0; at < nodes_.size(); ++at)
   {
+    const Node& node = nodes_[at];
+    const Leaf& leaf = leaves_[at];
     out.put(node.centre);
     out.put(node.first_child);
     out.put(node.children);
-    out.put(node.limit);
-    out.put(static_cast<std::uint32_t>(node.entries.size()));
-    out.put(node.entries.data(), node.entries.size());
+    out.put(leaf.limit);
+    out.put(static_cast<std::uint32_t>(leaf.entries.size()));
+    out.put(leaf.entries.data(), leaf.entries.size());
   }
   const std::uint64_t sum = out.sum();
   out.put(sum);
@@ -606,15 +703,18 @@ void ViewIndex::load(std::istream& stream)
   in.getList(read.free_, in.get<std::uint32_t>());
   const auto nodes = in.get<std::uint32_t>();
   read.nodes_.clear();
+  read.leaves_.clear();
   for (std::uint32_t at = 0; at < nodes; ++at)
   {
     Node node;
     node.centre = in.get<BinaryWord>();
     node.first_child = in.get<std::uint32_t>();
     node.children = in.get<std::uint32_t>();
-    node.limit = in.get<std::uint32_t>();
-    in.getList(node.entries, in.get<std::uint32_t>());
-    read.nodes_.push_back(std::move(node));
+    Leaf leaf;
+    leaf.limit = in.get<std::uint32_t>();
+    in.getList(leaf.entries, in.get<std::uint32_t>());
+    read.nodes_.push_back(node);
+    read.leaves_.push_back(std::move(leaf));
   }
   const std::uint64_t expected = in.sum();
   if (in.get<std::uint64_t>() != expected || !read.isConsistent())
@@ -642,7 +742,7 @@ bool ViewIndex::isConsistent() const
     const bool placed = leaf ? node.children == 0
                              : node.first_child > at && node.children > 0 &&
                                    std::size_t{ node.first_child } + node.children <= nodes_.size();
-    if (!placed || !std::all_of(node.entries.begin(), node.entries.end(), [&](const Entry& entry) {
+    if (!placed || !std::all_of(leaves_[at].entries.begin(), leaves_[at].entries.end(), [&](const Entry& entry) {
           return entry.view < views_.size() && !views_[entry.view].name.empty();
         }))
     {

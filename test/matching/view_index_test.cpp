@@ -5,7 +5,11 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstddef>
 #include <cstdint>
+#include <map>
 #include <random>
 #include <sstream>
 #include <stdexcept>
@@ -147,6 +151,82 @@ TEST(ViewIndex, OrdersViewsByWhatTheyShare)
   EXPECT_EQ(found[1].name, "shares40");
   EXPECT_EQ(found[2].name, "shares20");
   EXPECT_EQ(index.query(scene, 2).size(), 2U);
+}
+
+/** What a query gives for each view when each word is compared with all words, and scores as the header says. */
+std::map<std::string, double> scoresByAllWords(const std::map<std::string, Features>& views, const Features& query,
+                                               int max_distance)
+{
+  std::map<std::string, std::array<float, 16>> votes;
+  for (const BinaryFeature& feature : query)
+  {
+    std::map<std::string, const BinaryFeature*> similar;
+    for (const auto& [name, features] : views)
+    {
+      const auto distance = [&](const BinaryFeature& other) {
+        return hammingDistance(feature.word, other.word);
+      };
+      const auto nearest =
+          std::min_element(features.begin(), features.end(),
+                           [&](const BinaryFeature& a, const BinaryFeature& b) { return distance(a) < distance(b); });
+      if (nearest != features.end() && distance(*nearest) <= max_distance)
+      {
+        similar[name] = &*nearest;
+      }
+    }
+    const double rarity =
+        std::log(1.0 + static_cast<double>(views.size()) / (1.0 + static_cast<double>(similar.size())));
+    for (const auto& [name, nearest] : similar)
+    {
+      const double ratio = hammingDistance(feature.word, nearest->word) / (max_distance / 3.0);
+      const auto turn = static_cast<std::uint8_t>(nearest->angle - feature.angle);
+      votes[name][turn / 16U] += static_cast<float>(rarity * rarity * std::exp(-0.5 * ratio * ratio));
+    }
+  }
+  std::map<std::string, double> scores;
+  for (const auto& [name, own] : votes)
+  {
+    float most = 0.0F;
+    for (std::size_t i = 0; i < own.size(); ++i)
+    {
+      most = std::max(most, own[i] + own[(i + 1) % own.size()] + own[(i + 2) % own.size()]);
+    }
+    scores[name] = most / std::sqrt(static_cast<double>(views.at(name).size()));
+  }
+  return scores;
+}
+
+TEST(ViewIndex, ScoresAreThoseOfAComparisonWithAllWordsWhenAllAreChecked)
+{
+  ViewIndexParams params;
+  params.checked_words = 1000000;
+  params.leaf_words = 8;  // a deep tree
+  ViewIndex index(params);
+  std::map<std::string, Features> views;
+  for (unsigned i = 0; i < 40; ++i)
+  {
+    Features& features = views[nameOf(i)] = drawFeatures(i, 50 + i);
+    // Each view has some words of each of the three before, so that words are in one to four views.
+    for (unsigned before = 1; before <= std::min(i, 3U); ++before)
+    {
+      const Features again = seenAgain(views.at(nameOf(i - before)), i, static_cast<int>(10 * before), 40);
+      std::copy_n(again.begin(), 10, features.end() - 10 * before);
+    }
+    index.add(nameOf(i), features);
+  }
+  for (const std::size_t count : { 1U, 7U, 8U, 9U, 61U })
+  {
+    Features query = seenAgain(views.at(nameOf(20)), 99, 15, 100);
+    query.resize(count);
+    const std::map<std::string, double> expected = scoresByAllWords(views, query, params.max_distance);
+    const std::vector<ScoredView> found = index.query(query, 100);
+    ASSERT_EQ(found.size(), expected.size()) << count << " features";
+    for (const ScoredView& view : found)
+    {
+      ASSERT_EQ(expected.count(view.name), 1U) << view.name;
+      EXPECT_EQ(view.score, expected.at(view.name)) << view.name << " by " << count << " features";
+    }
+  }
 }
 
 TEST(ViewIndex, PrefersAViewOnWhoseTurnTheVotesAgree)

@@ -103,8 +103,12 @@ private:
     BinaryWord centre{};            ///< the word that those below this node resemble
     std::uint32_t first_child = 0;  ///< index into nodes_, where the children lie side by side; 0: this is a leaf
     std::uint32_t children = 0;     ///< number of children
-    std::uint32_t limit = 0;        ///< number of words above which a leaf is divided
-    std::vector<Entry> entries;     ///< words of a leaf
+  };
+  /** The words of a node; apart from it, as a query visits many more nodes than it reads the words of. */
+  struct Leaf
+  {
+    std::uint32_t limit = 0;     ///< number of words above which it is divided
+    std::vector<Entry> entries;  ///< its words; none unless the node is a leaf
   };
   struct View
   {
@@ -121,6 +125,7 @@ private:
 
   ViewIndexParams params_;
   std::vector<Node> nodes_;
+  std::vector<Leaf> leaves_;  // by index of the node
   std::vector<View> views_;
   std::vector<std::uint32_t> free_;             // indices of free places in views_
   std::map<std::string, std::uint32_t> slots_;  // index into views_ by name
