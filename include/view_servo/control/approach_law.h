@@ -70,8 +70,8 @@ public:
 
 /**
  * The law for params.base. The parameters must be valid.
- * @param most_tolerance the largest tolerance() of a DIFFERENTIAL base [m]: each time that corrections have not brought it
- * within tolerance(), the tolerance grows, until this. A HOLONOMIC base's tolerance() does not change.
+ * @param most_tolerance the largest tolerance() of a DIFFERENTIAL base [m]: each time that corrections have not brought
+ * it within tolerance(), the tolerance grows, until this. A HOLONOMIC base's tolerance() does not change.
  */
 std::unique_ptr<ApproachLaw> makeApproachLaw(const ApproachParams& params, double most_tolerance);
 

@@ -25,11 +25,11 @@ struct HeadingEvidence
 /** Options of the heading vote. */
 struct HeadingVoteParams
 {
-  int bins = 181;               ///< number of bins of the histogram of headings
-  double margin = 0.17;         ///< K: headings closer than this to +-pi/2 are too uncertain to be chosen [rad]
-  double smoothing = 0.02;      ///< standard deviation of the Gaussian over which a vote is spread [rad]
-  double narrowing = 0.7;       ///< factor of the region's width when the highest peak of all lies inside it
-  double widening = 1.3;        ///< factor of the region's width when the highest peak of all lies outside it
+  int bins = 181;           ///< number of bins of the histogram of headings
+  double margin = 0.17;     ///< K: headings closer than this to +-pi/2 are too uncertain to be chosen [rad]
+  double smoothing = 0.02;  ///< standard deviation of the Gaussian over which a vote is spread [rad]
+  double narrowing = 0.7;   ///< factor by which the region becomes narrower when the highest peak of all lies inside it
+  double widening = 1.3;    ///< factor by which the region becomes wider when the highest peak of all lies outside it
   double min_half_width = 0.1;  ///< least half width of the region [rad]
 
   /** Each fault in one line, those of nested parameters included; empty when the parameters are usable. */
@@ -50,8 +50,8 @@ class HeadingHistogram
 public:
   HeadingHistogram() = default;
   /**
-   * @param evidence matches as level points. @param yaw of the reference camera in the current one [rad]; 0 in the thesis,
-   * which forbids rotation.
+   * @param evidence matches as level points. @param yaw of the reference camera in the current one [rad]; 0 in the
+   * thesis, which forbids rotation.
    */
   HeadingHistogram(const HeadingEvidence& evidence, double yaw, const HeadingVoteParams& params);
 

@@ -98,7 +98,10 @@ struct HomingReport
   double confidence = 0.0;
   /** HeadingHistogram::votesFor() base_link, of the last matches used; empty before. */
   std::vector<double> histogram;
-  /** Right end of the headings in base_link at which the view is expected next, positive to the left; may pass -pi [rad]. */
+  /**
+   * Right end of the headings in base_link at which the view is expected next, positive to the left; may pass -pi
+   * [rad].
+   */
   double roi_min = std::numeric_limits<double>::quiet_NaN();
   double roi_max = std::numeric_limits<double>::quiet_NaN();     ///< left end; may pass pi [rad]
   double similarity = std::numeric_limits<double>::quiet_NaN();  ///< gradientSimilarity(), in [-1, 1]
@@ -109,7 +112,9 @@ struct HomingReport
   double displacement = std::numeric_limits<double>::quiet_NaN();
   bool tracked = false;  ///< the view's points were found in the last image; if not, only matches show the way
   int inliers = 0;       ///< number of matches or tracked points that agree; mode THESIS: number of all matches
-  /** The base's pose at the view, in odometry's frame; empty until its distance is known in metres, and when it is lost. */
+  /**
+   * The base's pose at the view, in odometry's frame; empty until its distance is known in metres, and when it is lost.
+   */
   std::optional<PlanarPose> goal_in_odom;
   /** Covariance of (x, y, yaw) of goal_in_odom [m, rad]; zero, and without meaning, while that is empty. */
   Eigen::Matrix3d goal_covariance = Eigen::Matrix3d::Zero();
@@ -171,8 +176,8 @@ public:
   virtual Course course() const = 0;
 
   /**
-   * Velocity that the base should have now, in base_link: course() applied to the newest odometry, not limited yet. Zero
-   * before the first odometry, and for STAND.
+   * Velocity that the base should have now, in base_link: course() applied to the newest odometry, not limited yet.
+   * Zero before the first odometry, and for STAND.
    */
   BaseVelocity command() const
   {
@@ -190,7 +195,10 @@ public:
     return {};
   }
 
-  /** Where the things are that the view shows, while its points are tracked and the distance is known in metres; else none. */
+  /**
+   * Where the things are that the view shows, while its points are tracked and the distance is known in metres; else
+   * none.
+   */
   virtual std::vector<HomingLandmark> landmarks() const
   {
     return {};

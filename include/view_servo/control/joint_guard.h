@@ -31,9 +31,10 @@ public:
   /**
    * Takes where joints are: a position [rad or m] for each name. Joints without limits are ignored, and some may be
    * missing.
-   * @param velocities one for each name [rad/s or m/s]; when there are fewer or more, they are computed from the positions.
-   * @return a message naming a position that is ignored because it is not a finite number or lies far beyond the limits;
-   * empty when no position is ignored.
+   * @param velocities one for each name [rad/s or m/s]; when there are fewer or more, they are computed from the
+   * positions.
+   * @return a message naming a position that is ignored because it is not a finite number or lies far beyond the
+   * limits; empty when no position is ignored.
    */
   std::string add(double time, const std::vector<std::string>& names, const std::vector<double>& positions,
                   const std::vector<double>& velocities);

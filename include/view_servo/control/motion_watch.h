@@ -11,8 +11,8 @@
 namespace view_servo
 {
 /**
- * Compares what a base is told with what its odometry says that it does. Knows no ROS; times are by one clock [s]. When it
- * goes back, or on by more than 0.5 s between two calls, as a clock that is set does, the comparison begins anew.
+ * Compares what a base is told with what its odometry says that it does. Knows no ROS; times are by one clock [s]. When
+ * it goes back, or on by more than 0.5 s between two calls, as a clock that is set does, the comparison begins anew.
  */
 class MotionWatch
 {

@@ -33,21 +33,24 @@ std::vector<Parameter> parameters(RouteGuideParams& params);
 
 /**
  * The stops to drive to, in order.
- * @param start, goal names of views of the route; empty: the first and the last on the way. @param reverse from the last
- * stop of the route to the first. @throws std::invalid_argument naming a view that is not on the route, or saying that the
- * goal comes before the start.
+ * @param start, goal names of views of the route; empty: the first and the last on the way. @param reverse from the
+ * last stop of the route to the first. @throws std::invalid_argument naming a view that is not on the route, or saying
+ * that the goal comes before the start.
  */
 std::vector<RouteStop> stopsBetween(const Route& route, const std::string& start, const std::string& goal,
                                     bool reverse);
 
 /**
- * Leads a base that homes to one view of a route after another: says when it is time for the next one, and where that is by
- * odometry until it is found. Knows no ROS and no time. Poses are of the base in odometry's frame.
+ * Leads a base that homes to one view of a route after another: says when it is time for the next one, and where that
+ * is by odometry until it is found. Knows no ROS and no time. Poses are of the base in odometry's frame.
  */
 class RouteGuide
 {
 public:
-  /** @param stops at least one, in the order in which they are driven to. @param blind_speed on the way by odometry [m/s]. */
+  /**
+   * @param stops at least one, in the order in which they are driven to. @param blind_speed on the way by odometry
+   * [m/s].
+   */
   RouteGuide(const RouteGuideParams& params, std::vector<RouteStop> stops, double blind_speed);
 
   /** The view that is homed to. */
@@ -92,8 +95,8 @@ public:
   void goTo(const std::string& view);
 
   /**
-   * The way to view() by odometry, while homing does not know it: from the last view and how the two were recorded. Empty
-   * where homing knows better, nothing is known, or the base has gone as far by odometry as it may.
+   * The way to view() by odometry, while homing does not know it: from the last view and how the two were recorded.
+   * Empty where homing knows better, nothing is known, or the base has gone as far by odometry as it may.
    */
   std::optional<Course> blindCourse() const;
 

@@ -16,7 +16,7 @@ namespace view_servo
 struct StillPoseParams
 {
   double duration = 0.8;          ///< how long it has to stand [s]
-  std::size_t min_samples = 5;    ///< least number of samples in that time
+  std::size_t min_samples = 5;    ///< least number of samples within `duration`
   double max_gap = 0.5;           ///< longest time between two samples [s]
   double max_translation = 1e-3;  ///< largest distance of the flange from its mean place [m]
   double max_rotation = 2e-3;     ///< largest angle between the flange and its mean orientation [rad]

@@ -10,9 +10,9 @@
 namespace view_servo
 {
 /**
- * The places that a robot or its camera has passed, thinned so that a long way takes no more memory and time than a short
- * one: places are left out that are nearer than a spacing to the last one kept, and whenever there are too many, every
- * second one is dropped and the spacing doubled.
+ * The places that a robot or its camera has passed, thinned so that a long way takes no more memory and time than a
+ * short one: places are left out that are nearer than a spacing to the last one kept, and whenever there are too many,
+ * every second one is dropped and the spacing doubled.
  */
 class TravelledWay
 {

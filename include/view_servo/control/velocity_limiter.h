@@ -53,8 +53,8 @@ public:
   }
 
   /**
-   * The velocity allowed `dt` [s] after the last one. A wanted velocity that is zero or not finite stops at once. With a
-   * `dt` that is not above 0 the last velocity stays.
+   * The velocity allowed `dt` [s] after the last one. A wanted velocity that is zero or not finite stops at once. With
+   * a `dt` that is not above 0 the last velocity stays.
    */
   Velocity next(const Velocity& wanted, double dt)
   {

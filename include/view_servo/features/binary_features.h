@@ -21,8 +21,8 @@ using BinaryWord = std::array<std::uint64_t, 4>;
 /** Number of bits in which two words differ, 0 to 256. */
 inline int hammingDistance(const BinaryWord& a, const BinaryWord& b)
 {
-  // Counts of bits are summed side by side: first of 2 bits, then of 4, of 8 and of 16. Unlike the compiler's popcount this
-  // is fast also where the processor's instruction for it may not be used.
+  // Counts of bits are summed side by side: first of 2 bits, then of 4, of 8 and of 16. Unlike the compiler's popcount
+  // this is fast also where the processor's instruction for it may not be used.
   constexpr std::uint64_t PAIRS = 0x5555555555555555;
   constexpr std::uint64_t NIBBLES = 0x3333333333333333;
   constexpr std::uint64_t BYTES = 0x0f0f0f0f0f0f0f0f;

@@ -41,10 +41,10 @@ struct Camera
    */
   std::string fault() const;
 
-  /** Whether raw images are those of a pinhole, with the camera matrix `k`. Without a fault. */
+  /** Whether raw images are those of a pinhole, with the camera matrix `k`. For a camera that has no fault(). */
   bool isPinhole() const;
 
-  /** The pinhole that rectified images are of; the camera itself when it is one. Without a fault. */
+  /** The pinhole that rectified images are of; the camera itself when it is one. For a camera that has no fault(). */
   Camera rectified() const;
 
   /** The rotation raw frame -> rectified frame. */

@@ -27,7 +27,9 @@ struct RelativePose
 /** [v]x: the matrix whose product with w is v × w. */
 Eigen::Matrix3d crossMatrix(const Eigen::Vector3d& v);
 
-/** The essential matrices of exactly five correspondences, ten at most (Nistér 2004); none for another number of them. */
+/**
+ * The essential matrices of exactly five correspondences, ten at most (Nistér 2004); none for another number of them.
+ */
 std::vector<Eigen::Matrix3d> essentialFromFivePoints(const Correspondences& five);
 
 /** The four motions that give an essential matrix; with at most one of them, points lie in front of both cameras. */
@@ -40,9 +42,10 @@ std::vector<RelativePose> posesFromEssential(const Eigen::Matrix3d& essential);
 RelativePose refineRelativePose(const RelativePose& initial, const Correspondences& pairs, int max_iterations = 10);
 
 /**
- * Covariance of a motion that was fitted to pairs, to first order: of a small rotation vector [rad] applied before R, so
- * about the axes of the reference camera, and of the unit vector t, which does not vary along itself.
- * @param variance of a Sampson distance, in units of the points. @return not finite where the pairs leave the motion open.
+ * Covariance of a motion that was fitted to pairs, to first order: of a small rotation vector [rad] applied before R,
+ * so about the axes of the reference camera, and of the unit vector t, which does not vary along itself.
+ * @param variance of a Sampson distance, in units of the points. @return not finite where the pairs leave the motion
+ * open.
  */
 Eigen::Matrix<double, 6, 6> covarianceOf(const RelativePose& pose, const Correspondences& pairs, double variance);
 

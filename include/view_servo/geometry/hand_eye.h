@@ -15,8 +15,8 @@
 namespace view_servo
 {
 /** @file
- * Hand-eye calibration of a camera on an arm's flange, without a calibration board: the camera looks at one plane, of which
- * neither the distance nor the direction is known, from several poses of the arm.
+ * Hand-eye calibration of a camera on an arm's flange, without a calibration board: the camera looks at one plane, of
+ * which neither the distance nor the direction is known, from several poses of the arm.
  */
 
 /** The stored view of the plane. */
@@ -42,7 +42,9 @@ struct HandEyeParams
   double min_travel = 0.15;          ///< least way of the camera between two poses, as a part of the plane's distance
   double max_translation_sigma = 0.005;  ///< largest standard deviation of the camera's place, in any direction [m]
   double max_rotation_sigma = 0.0175;    ///< largest standard deviation of its orientation, about any axis [rad]
-  /** Distance of the plane from the view's camera, along its normal, where somebody has measured it [m]; NaN: unknown. */
+  /**
+   * Distance of the plane from the view's camera, along its normal, where somebody has measured it [m]; NaN: unknown.
+   */
   double distance = std::numeric_limits<double>::quiet_NaN();
   /** Ratio of the arm's errors of position [m] to those of rotation [rad]; 0.5 suits arms that reach about 1 m. */
   double arm_lever = 0.5;
@@ -77,17 +79,19 @@ struct HandEyeResult
 
   Eigen::Isometry3d camera_in_flange = Eigen::Isometry3d::Identity();  ///< pose of the optical frame in the flange [m]
   /**
-   * Covariance of `camera_in_flange`: position [m], then rotation vector [rad], both along the flange's axes, so that the truth is
-   * (t + δt, exp(δr) R).
+   * Covariance of `camera_in_flange`: position [m], then rotation vector [rad], both along the flange's axes, so that
+   * the truth is (t + δt, exp(δr) R).
    */
   Eigen::Matrix<double, 6, 6> covariance = Eigen::Matrix<double, 6, 6>::Zero();
   Eigen::Isometry3d view_in_base = Eigen::Isometry3d::Identity();  ///< camera pose that the view was stored at [m]
   Eigen::Vector3d normal = Eigen::Vector3d::UnitZ();  ///< unit, of the plane in the view's camera frame, away from it
   double distance = 0.0;                              ///< of the plane from the view's camera [m]
-  double distance_sigma = 0.0;                        ///< standard deviation of that [m]
-  double image_error = 0.0;        ///< standard deviation of a corner's coordinate, as the residuals have it [px]
-  double rotation_error = 0.0;     ///< standard deviation of the arm's rotation about each axis, likewise [rad]
-  double translation_error = 0.0;  ///< standard deviation of the flange's place along each axis, likewise [m]
+  double distance_sigma = 0.0;                        ///< standard deviation of `distance` [m]
+  double image_error = 0.0;  ///< standard deviation of a corner's coordinate, as the residuals have it [px]
+  /** Standard deviation of the arm's rotation about each axis, as the residuals have it [rad]. */
+  double rotation_error = 0.0;
+  /** Standard deviation of the flange's place along each axis, as the residuals have it [m]. */
+  double translation_error = 0.0;
   std::vector<HandEyeResidual> residuals;  ///< one a pose
   HandEyeMotion motion;                    ///< of the poses that were used
 
@@ -98,8 +102,8 @@ struct HandEyeResult
 };
 
 /**
- * How far poses are from one another; `travel` is NaN when the homographies do not tell the plane, and other numbers are
- * of the arm alone. @throws std::invalid_argument as calibrateHandEye() does.
+ * How far poses are from one another; `travel` is NaN when the homographies do not tell the plane, and other numbers
+ * are of the arm alone. @throws std::invalid_argument as calibrateHandEye() does.
  */
 HandEyeMotion handEyeMotion(const HandEyeView& view, const std::vector<HandEyePose>& poses);
 
@@ -107,13 +111,13 @@ HandEyeMotion handEyeMotion(const HandEyeView& view, const std::vector<HandEyePo
 std::vector<std::string> missingMotion(const HandEyeMotion& motion, const HandEyeParams& params);
 
 /**
- * The pose of the camera on the flange: from AX = XB by cv::calibrateHandEye (Horaud & Dornaika 1995) over triples of poses,
- * then refined together with the view's pose, and the plane's direction and distance, as errors of the view's corners in
- * the images. The errors of arm and image are told apart by restricted maximum likelihood, so that each weighs as it
- * should. Poses that contradict most others are left out.
+ * The pose of the camera on the flange: from AX = XB by cv::calibrateHandEye (Horaud & Dornaika 1995) over triples of
+ * poses, then refined together with the view's pose, and the plane's direction and distance, as errors of the view's
+ * corners in the images. The errors of arm and image are told apart by restricted maximum likelihood, so that each
+ * weighs as it should. Poses that contradict most others are left out.
  *
- * Does the same for poses in another order. Nothing is found when motion is lacking, when fewer than half of the poses agree, or
- * when the result is less certain than asked for.
+ * Does the same for poses in another order. Nothing is found when motion is lacking, when fewer than half of the poses
+ * agree, or when the result is less certain than asked for.
  * @throws std::invalid_argument when the view has not four corners in general position, the camera matrix is none, a
  * number is not finite, a flange's rotation is none or a known distance is not above 0.
  */

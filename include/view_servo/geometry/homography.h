@@ -13,10 +13,13 @@ namespace view_servo
 {
 /** @file
  * Plane homographies. Throughout, H maps the reference image to the current one: `x_cur ~ H x_ref`, 3x3, pixels.
- * Matrices that are estimated here have Frobenius norm 1 and the sign that gives points in view a positive third coordinate.
+ * Matrices that are estimated here have Frobenius norm 1 and the sign that gives points in view a positive third
+ * coordinate.
  */
 
-/** H scaled so that H(2,2) = 1, or to Frobenius norm 1 where H(2,2) is nearly zero; other functions here return norm 1. */
+/**
+ * H scaled so that H(2,2) = 1, or to Frobenius norm 1 where H(2,2) is nearly zero; other functions here return norm 1.
+ */
 Eigen::Matrix3d normalizedHomography(const Eigen::Matrix3d& h);
 
 /** The point H x, for x = `point` [px]. At or beyond the line at infinity (third coordinate <= 0) the result is NaN. */

@@ -32,13 +32,13 @@ struct MountParams
   double min_travel = 0.1;  ///< least way of the camera between two poses, as a part of the plane's distance
   /** Standard deviation of a way, along and across it, as a part of it: a first guess, the data tell it better. */
   double way_noise = 0.02;
-  double turn_noise = 0.02;  ///< standard deviation of a turn, as a part of it: likewise
+  double turn_noise = 0.02;  ///< standard deviation of a turn, as a part of it: a first guess, as way_noise is
   double max_translation_sigma =
       0.005;  ///< largest standard deviation of the camera's place on the floor, any direction [m]
   double max_rotation_sigma = 0.0175;  ///< largest standard deviation of its orientation, about any axis [rad]
   /** Of the camera above the base's frame, where somebody has measured it [m]; NaN: unknown. */
   double height = std::numeric_limits<double>::quiet_NaN();
-  double height_sigma = 0.005;  ///< standard deviation of that [m]
+  double height_sigma = 0.005;  ///< standard deviation of `height` [m]
   /**
    * The plane is the floor, z = 0 in the frame of odometry: then the camera's height follows, and `height` does not
    * count.
@@ -60,10 +60,12 @@ struct MountResidual
 {
   bool used = false;    ///< false: the pose disagrees with the others, and was left out
   double pixels = 0.0;  ///< root mean square distance of the view's corners from where they should be [px]
-  bool odometry_used =
-      true;           ///< false: odometry since the last pose that is used disagrees with the images, and was left out
-  double way = 0.0;   ///< distance between where odometry and the images have the base since then [m]
-  double turn = 0.0;  ///< angle between how odometry and the images have it turned since then [rad]
+  /** False: odometry since the last pose that is used disagrees with the images, and was left out. */
+  bool odometry_used = true;
+  /** Distance between the base's places by odometry and by the images, from the pose before that is used [m]. */
+  double way = 0.0;
+  /** Angle between the base's turns by odometry and by the images, from the pose before that is used [rad]. */
+  double turn = 0.0;
 };
 
 /** What calibrateMount() finds. Unless `found`, only `message`, `missing`, `residuals` and `motion` have a meaning. */
@@ -83,10 +85,12 @@ struct MountResult
   Eigen::Isometry3d view_in_odom = Eigen::Isometry3d::Identity();  ///< camera pose that the view was stored at [m]
   Eigen::Vector3d normal = Eigen::Vector3d::UnitZ();  ///< unit, of the plane in the view's camera frame, away from it
   double distance = 0.0;                              ///< of the plane from the view's camera [m]
-  double distance_sigma = 0.0;                        ///< standard deviation of that [m]
-  double image_error = 0.0;              ///< standard deviation of a corner's coordinate, as the residuals have it [px]
-  double way_error = 0.0;                ///< standard deviation of a way by odometry, as a part of it, likewise
-  double turn_error = 0.0;               ///< standard deviation of a turn by odometry, as a part of it, likewise
+  double distance_sigma = 0.0;                        ///< standard deviation of `distance` [m]
+  double image_error = 0.0;  ///< standard deviation of a corner's coordinate, as the residuals have it [px]
+  /** Standard deviation of a way by odometry, as a part of it, as the residuals have it. */
+  double way_error = 0.0;
+  /** Standard deviation of a turn by odometry, as a part of it, as the residuals have it. */
+  double turn_error = 0.0;
   std::vector<MountResidual> residuals;  ///< one a pose
   MountMotion motion;                    ///< of the poses that were used
 

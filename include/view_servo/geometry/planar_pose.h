@@ -55,8 +55,8 @@ struct CameraMount
   Eigen::Vector2d unlevel(const Eigen::Vector2d& point) const;
 
   /**
-   * The base's motion of a camera's motion: takes the pose of the camera at one place in the camera at another, and returns
-   * the pose of the base at the one place in the base at the other.
+   * The base's motion of a camera's motion: takes the pose of the camera at one place in the camera at another, and
+   * returns the pose of the base at the one place in the base at the other.
    */
   PlanarPose ofBase(const PlanarPose& camera_in_camera) const;
   /** The inverse of ofBase(). */

@@ -33,8 +33,8 @@ constexpr int MIN_IMAGE_SIDE = 16;
 cv::Mat toGrey(const cv::Mat& image, const std::string& name);
 
 /**
- * The size that the header of a PNG, JPEG, PNM, BMP or TIFF file gives, without decoding the image; of a TIFF with strips or
- * tiles larger than the image that of these, as decoding takes the memory for them.
+ * The size that the header of a PNG, JPEG, PNM, BMP or TIFF file gives, without decoding the image; of a TIFF with
+ * strips or tiles larger than the image that of these, as decoding takes the memory for them.
  * @throws ImageError when the bytes do not begin as such a file, or the size is beyond the limits.
  */
 cv::Size encodedImageSize(const std::string& bytes, const std::string& name);
@@ -52,7 +52,10 @@ cv::Mat decodeImage(const std::string& bytes, const std::string& name);
  */
 cv::Mat decodeGreyImage(const std::string& bytes, const std::string& name);
 
-/** The same of a file. @throws ImageError likewise, and when it is missing, not a regular file or not readable. */
+/**
+ * An image file as 8-bit grey. @throws ImageError as decodeGreyImage(), and when the file is missing, not a regular
+ * file or not readable.
+ */
 cv::Mat readGreyImage(const std::string& path);
 
 /**

@@ -92,8 +92,8 @@ struct LineGroup
 };
 
 /**
- * Key of a triplet: ((p1 * 81 + p2) * 81 + p3) * classes + c, with the indices p1 to p3 of its three pairs, as pairIndex()
- * gives them, and its class c in [0, classes). The thesis' eq. 4.3 adds the class c to the last index,
+ * Key of a triplet: ((p1 * 81 + p2) * 81 + p3) * classes + c, with the indices p1 to p3 of its three pairs, as
+ * pairIndex() gives them, and its class c in [0, classes). The thesis' eq. 4.3 adds the class c to the last index,
  * which lets keys collide.
  */
 std::uint32_t tripletKey(int p1, int p2, int p3, int c, int classes);

@@ -83,9 +83,9 @@ constexpr std::size_t LINE_DIRECTIONS = 4;
 struct LineEvidence
 {
   std::size_t seen = 0;    ///< segments sent into the current image
-  std::size_t found = 0;   ///< of these, those for which a segment is there that looks alike
+  std::size_t found = 0;   ///< of the seen ones, those for which a segment is there that looks alike
   std::size_t tried = 0;   ///< trials of sending a segment 10, 17 or 27 px aside, both ways: six for each one seen
-  std::size_t beside = 0;  ///< of these, those for which a segment is there that looks alike
+  std::size_t beside = 0;  ///< trials that came to a place where a segment is that looks alike
 
   /** Probability that a segment is found where it does not belong, as the rule of succession estimates it, (0, 1). */
   double chance() const

@@ -47,8 +47,9 @@ std::vector<Parameter> parameters(PointMatcherParams& params);
 struct ProfileEnds
 {
   /**
-   * Orders it among the profiles that start where it starts. The upper half is the angle (as the monotonic and cheaper diamond
-   * angle, in 2^14 steps a quadrant), the lower half the corner at the other end: so that all at a corner differ.
+   * Orders it among the profiles that start where it starts. The upper half is the angle (as the monotonic and cheaper
+   * diamond angle, in 2^14 steps a quadrant), the lower half the corner at the other end: so that all at a corner
+   * differ.
    */
   std::uint32_t from_start;
   std::uint32_t from_end;  ///< the same among the profiles at its end, with its start as the corner at the other end

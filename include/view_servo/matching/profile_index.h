@@ -76,7 +76,9 @@ public:
     }
   };
 
-  /** @param begin those of profile i are matches[begin[i]] .. matches[begin[i + 1] - 1]; one more number than profiles. */
+  /**
+   * @param begin those of profile i are matches[begin[i]] .. matches[begin[i + 1] - 1]; one more number than profiles.
+   */
   SimilarProfiles(std::vector<ProfileMatch> matches, std::vector<std::size_t> begin)
     : matches_(std::move(matches)), begin_(std::move(begin))
   {
@@ -114,8 +116,8 @@ public:
   ProfileIndex& operator=(ProfileIndex&&) noexcept;
 
   /**
-   * For each profile of `current` the similar ones of the reference; none for those that are not searched for. On all of
-   * OpenCV's threads.
+   * For each profile of `current` the similar ones of the reference; none for those that are not searched for. On all
+   * of OpenCV's threads.
    * @throws std::invalid_argument when the two sets differ in their number of coefficients.
    */
   SimilarProfiles search(const ProfileSet& current, const ProfileSearchParams& params) const;

@@ -48,8 +48,8 @@ struct ScoredView
  * counted again and again. A view's score is of the votes that agree on how the image is turned about the optical axis,
  * divided by the root of the view's number of features.
  *
- * The same calls in the same order give the same results. Not safe to use from several threads while one of them changes
- * it.
+ * The same calls in the same order give the same results. Not safe to use from several threads while one of them
+ * changes it.
  */
 class ViewIndex
 {
@@ -66,7 +66,9 @@ public:
   /** Removes a view; false when there is none of this name. Takes time in proportion to the size of the index. */
   bool remove(const std::string& name);
 
-  /** The most likely views, best first, `most` at most; equal scores by name. Views without a similar word are left out. */
+  /**
+   * The most likely views, best first, `most` at most; equal scores by name. Views without a similar word are left out.
+   */
   std::vector<ScoredView> query(const std::vector<BinaryFeature>& features, std::size_t most) const;
 
   /** Whether there is a view of this name. */

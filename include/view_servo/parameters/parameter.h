@@ -95,7 +95,9 @@ void setParameter(const std::vector<Parameter>& table, const std::string& name, 
 /** Tables one after the other. */
 std::vector<Parameter> joined(std::initializer_list<std::vector<Parameter>> tables);
 
-/** A table whose names begin with `prefix`, also where ranges name other parameters: for two of one kind in one table. */
+/**
+ * A table whose names begin with `prefix`, also where ranges name other parameters: for two of one kind in one table.
+ */
 std::vector<Parameter> prefixed(const std::string& prefix, std::vector<Parameter> table);
 
 /**

@@ -14,9 +14,9 @@ namespace view_servo
 /** @file Every text in YAML that may come from elsewhere is read by these. */
 
 /**
- * What a text in YAML holds. It comes to an end with every text, while YAML::Load() of yaml-cpp 0.6 takes all memory for
- * one that ends after a colon within braces. Aliases may not make more of it than it seems to be: a few lines of them can
- * stand for more values than fit into memory.
+ * What a text in YAML holds. It comes to an end with every text, while YAML::Load() of yaml-cpp 0.6 takes all memory
+ * for one that ends after a colon within braces. Aliases may not make more of it than it seems to be: a few lines of
+ * them can stand for more values than fit into memory.
  * @throws std::exception when it is no YAML, larger than 4 MB, nested deeper than 100 times, or when it stands for more
  * than a million values.
  */

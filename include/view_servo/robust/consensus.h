@@ -14,12 +14,15 @@ public:
   virtual ~Consensus() = default;
 
   /**
-   * Cost of a model, the smaller the better. May return infinity as soon as it is certain, or nearly certain, that the cost
-   * is not below `limit`; with a limit of infinity the cost is exact.
+   * Cost of a model, the smaller the better. May return infinity as soon as it is certain, or nearly certain, that the
+   * cost is not below `limit`; with a limit of infinity the cost is exact.
    */
   virtual double cost(const Model& model, double limit) = 0;
 
-  /** Sets `inliers` to the indices of the data that support a model, ascending, with the inlier threshold multiplied by `width`. */
+  /**
+   * Sets `inliers` to the indices of the data that support a model, ascending, with the inlier threshold multiplied by
+   * `width`.
+   */
   virtual void findInliers(const Model& model, double width, std::vector<int>& inliers) = 0;
 
   /** Called with the inliers of each new best sample, by which later models can be rejected sooner. */

@@ -46,8 +46,8 @@ private:
  * within a threshold. So fits to parts of the pairs, drawn at random, compete by how near most pairs come to them, at
  * several scales at once (as in MAGSAC, Barath et al. 2019), and the best is refined over the pairs within three
  * standard deviations, by the median.
- * @param huber_width Sampson distances beyond it count linearly instead of squared [px]. @return `matrix` when nothing is
- * better.
+ * @param huber_width Sampson distances beyond it count linearly instead of squared [px]. @return `matrix` when nothing
+ * is better.
  */
 Eigen::Matrix3d polishFundamental(const Eigen::Matrix3d& matrix, const Correspondences& pairs, double huber_width);
 

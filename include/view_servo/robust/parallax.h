@@ -25,20 +25,20 @@ public:
    * @param plane homography, x_cur ~ H x_ref [px].
    * @param pairs matches of all kinds, the most trustworthy first: the fewer wrong ones are before the right ones, the
    * more the right ones mean.
-   * @param threshold [px]: a pair agrees with an F when its Sampson distance is below this, and counts as on the plane when
-   * its current point is nearer than twice this to where the plane's homography sends the reference point.
+   * @param threshold [px]: a pair agrees with an F when its Sampson distance is below this, and counts as on the plane
+   * when its current point is nearer than twice this to where the plane's homography sends the reference point.
    */
   Parallax(const Eigen::Matrix3d& plane, const Correspondences& pairs, double threshold);
 
   /**
-   * -log10 of the expected number of epipoles with which as many pairs off the plane agree, when the directions of their
-   * parallax are random (a-contrario, as logSignificance()): at 0 one such epipole is expected by chance.
+   * -log10 of the expected number of epipoles with which as many pairs off the plane agree, when the directions of
+   * their parallax are random (a-contrario, as logSignificance()): at 0 one such epipole is expected by chance.
    */
   double significance(const Eigen::Matrix3d& f) const;
 
   /**
-   * Draws `samples` matrices [e]x H, each with the epipole e of two pairs off the plane, and returns the most significant
-   * one; empty when too few pairs lie off the plane.
+   * Draws `samples` matrices [e]x H, each with the epipole e of two pairs off the plane, and returns the most
+   * significant one; empty when too few pairs lie off the plane.
    */
   std::optional<Eigen::Matrix3d> findFundamental(int samples, Rng& rng) const;
 
@@ -62,8 +62,8 @@ private:
 std::optional<Eigen::Matrix3d> bestPlane(const Correspondences& pairs, double tolerance, Rng& rng);
 
 /**
- * Parallax::significance() of a fundamental matrix off the plane on which most of those pairs lie that agree with it, for
- * the best of a few tolerances up to `threshold` [px]: where matches are exact, a small parallax tells as well.
+ * Parallax::significance() of a fundamental matrix off the plane on which most of those pairs lie that agree with it,
+ * for the best of a few tolerances up to `threshold` [px]: where matches are exact, a small parallax tells as well.
  * @param pairs as for Parallax.
  */
 double significanceOffBestPlane(const Eigen::Matrix3d& f, const Correspondences& pairs, double threshold, Rng& rng);

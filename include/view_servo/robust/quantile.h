@@ -11,8 +11,8 @@
 namespace view_servo
 {
 /**
- * The value below which `part` of all values lie: in ascending order the one with index floor(part x number of values), or
- * the last one. NaN counts as larger than any number.
+ * The value below which `part` of all values lie: in ascending order the one with index floor(part x number of values),
+ * or the last one. NaN counts as larger than any number.
  * @param values at least one. @param part in [0, 1].
  */
 inline double quantileOf(std::vector<double> values, double part)

@@ -14,9 +14,9 @@ namespace view_servo
 double logSignificance(std::size_t candidates, std::size_t inliers, int sample_size, double probability);
 
 /**
- * log10 of an upper bound (Chernoff's) of the probability that at least `successes` of `count` independent events happen, each
- * of which has `probability`; 0 when that many are expected anyway. For events of different probabilities their mean may
- * be given.
+ * log10 of an upper bound (Chernoff's) of the probability that at least `successes` of `count` independent events
+ * happen, each of which has `probability`; 0 when that many are expected anyway. For events of different probabilities
+ * their mean may be given.
  */
 double logBinomialTail(std::size_t count, std::size_t successes, double probability);
 

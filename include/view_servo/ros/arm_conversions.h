@@ -22,10 +22,10 @@ namespace view_servo
  */
 
 /**
- * What servoing to a stored view needs: the camera's matrix and image size once distortion is removed, and the middle of the
- * view's region there, which is the chosen point.
- * @param camera that is there now. @throws std::runtime_error naming the view when this camera cannot show that point, and as
- * cameraOf() does.
+ * What servoing to a stored view needs: the camera's matrix and image size once distortion is removed, and the middle
+ * of the view's region there, which is the chosen point.
+ * @param camera that is there now. @throws std::runtime_error naming the view when this camera cannot show that point,
+ * and as cameraOf() does.
  */
 ServoTarget servoTargetOf(const StoredView& view, const Camera& camera);
 

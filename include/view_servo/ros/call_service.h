@@ -10,8 +10,8 @@
 namespace view_servo
 {
 /**
- * Calls a service once. It takes as long as the service does, as roscpp knows no deadline: so it is not for what moves a
- * robot, and where time matters it is called by a thread of its own, as in SimulatedRun.
+ * Calls a service once. It takes as long as the service does, as roscpp knows no deadline: so it is not for what moves
+ * a robot, and where time matters it is called by a thread of its own, as in SimulatedRun.
  *
  * In place of ros::service::call(), which loses a response now and then: the end of its connection, which the server
  * closes after each call, may overtake the response in roscpp (ros_comm issue 1976). That of a persistent client stays.

@@ -52,8 +52,9 @@ class CameraImageSubscriber : public message_filters::SimpleFilter<CameraImage>
 public:
   /**
    * Calls what is registered for each image from now on.
-   * @param private_nh whose parameter `image_transport` is used, where there is one, and where transports have parameters
-   * of their own. @param topic of raw images, before remapping. @param transport the default of that parameter.
+   * @param private_nh whose parameter `image_transport` is used, where there is one, and where transports have
+   * parameters of their own. @param topic of raw images, before remapping. @param transport the default of that
+   * parameter.
    * @throws std::invalid_argument naming the transports there are, when it is not among them.
    */
   void subscribe(const ros::NodeHandle& nh, const ros::NodeHandle& private_nh, const std::string& topic,

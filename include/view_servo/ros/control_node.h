@@ -122,8 +122,9 @@ void waitForLastCommand();
 constexpr std::uint32_t CONTROL_NODE_THREADS = 4;
 
 /**
- * Has a robot stopped before ROS shuts down in a process that belongs to somebody else. From the first one to the end of the
- * last, SIGINT, SIGTERM and the master's order to shut down first have `stop` called of all of them, and then shut ROS down.
+ * Has a robot stopped before ROS shuts down in a process that belongs to somebody else. From the first one to the end
+ * of the last, SIGINT, SIGTERM and the master's order to shut down first have `stop` called of all of them, and then
+ * shut ROS down.
  */
 class StopBeforeShutdown
 {

@@ -66,7 +66,10 @@ cv::Mat toGrey(const sensor_msgs::Image& image, const std::string& name);
  */
 cv::Mat toGrey(const sensor_msgs::CompressedImage& image, const std::string& name);
 
-/** Size of a compressed image by the header of its data. @throws ImageError likewise, but for damage after the header. */
+/**
+ * Size of a compressed image by the header of its data. @param name as above. @throws ImageError as toGrey() does,
+ * unless it is what follows the header that is damaged.
+ */
 cv::Size sizeOf(const sensor_msgs::CompressedImage& image, const std::string& name);
 
 /**
@@ -85,10 +88,12 @@ sensor_msgs::RegionOfInterest toRegionOfInterest(const cv::Rect& rect);
 
 /** The pose in a transform that tf gives from the view's frame (source) to ViewPose::frame (target). */
 ViewPose toViewPose(const geometry_msgs::TransformStamped& transform);
+/** The pose in its own frame, ViewPose::frame. */
 geometry_msgs::PoseStamped toPoseStamped(const ViewPose& pose, const ros::Time& stamp);
 /** Of StructurePose::view_from_current. */
 geometry_msgs::PoseWithCovariance toPoseWithCovariance(const StructurePose& pose);
 
+/** The matches in the same order; places in pixels, as they are. */
 std::vector<PointMatch> toPointMatches(const std::vector<MatchedPoint>& matches);
 LineSegment toLineSegment(const Segment& segment);
 std::vector<LineMatch> toLineMatches(const std::vector<MatchedLine>& lines);

@@ -35,8 +35,8 @@ struct HomingDriverParams
   CameraInputParams camera;
   std::filesystem::path views_dir;  ///< directory of the stored views; empty: as viewsDir() says
   /**
-   * Stored view whose direction is estimated while there is no goal, and to which the base drives when a goal's `view` is
-   * empty. Empty: nothing is estimated, and such a goal is refused.
+   * Stored view whose direction is estimated while there is no goal, and to which the base drives when a goal's `view`
+   * is empty. Empty: nothing is estimated, and such a goal is refused.
    */
   std::string view;
   std::string base_frame = "base_link";  ///< tf frame of the base, in which commands are expressed
@@ -49,7 +49,7 @@ struct HomingDriverParams
    */
   double match_timeout = 0.25;
   HomingParams homing;
-  VelocityLimits limits;
+  VelocityLimits limits;  ///< of the commands
 
   HomingDriverParams()
   {

@@ -30,7 +30,10 @@ struct LearntView
   ViewStructure structure;  ///< without points: nothing has been learnt
 };
 
-/** What has been learnt, but is damaged, is left out with a warning. @throws ViewStoreError as ViewStore::load(). */
+/**
+ * Reads a view, and what has been learnt of it; that is left out with a warning when it is damaged. @throws
+ * ViewStoreError as ViewStore::load().
+ */
 LearntView loadLearntView(const ViewStore& store, const std::string& name);
 
 /** Homing to a view: for a goal, or without one, to estimate the view's direction only. */
@@ -49,7 +52,8 @@ struct HomingTask
 
 /**
  * The task of homing to a stored view.
- * @param info calibration of the images that homing will get. @param base_from_camera pose of their optical frame in base_link.
+ * @param info calibration of the images that homing will get. @param base_from_camera pose of their optical frame in
+ * base_link.
  * @throws std::invalid_argument saying why homing to this view by such images cannot be.
  */
 std::shared_ptr<HomingTask> makeHomingTask(const LearntView& stored, const sensor_msgs::CameraInfoConstPtr& info,
@@ -66,9 +70,9 @@ struct HomingOutcome
 };
 
 /**
- * Stores, once, what a task has learnt of its view: when the base has arrived, and in a lesson when it is 0.3 m away from
- * the view, knows that in metres, and has learnt 30 points. That storing failed is a warning. Takes as long as a disk
- * does: only for the worker's thread.
+ * Stores, once, what a task has learnt of its view: when the base has arrived, and in a lesson when it is 0.3 m away
+ * from the view, knows that in metres, and has learnt 30 points. That storing failed is a warning. Takes as long as a
+ * disk does: only for the worker's thread.
  * @return whether it was tried now.
  */
 bool storeStructure(const ViewStore& store, const HomingOutcome& outcome);

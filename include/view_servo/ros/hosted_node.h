@@ -14,11 +14,11 @@
 namespace view_servo
 {
 /**
- * A node in a process that it shares with others, as a nodelet does. It has a queue and threads of its own, as many as in a
- * process of its own: a slow service or callback of one node keeps no other waiting, and no driver's control.
+ * A node in a process that it shares with others, as a nodelet does. It has a queue and threads of its own, as many as
+ * in a process of its own: a slow service or callback of one node keeps no other waiting, and no driver's control.
  *
- * Where the node drives a robot, zero is sent before this ends, and before the process does by a signal or by the master
- * (see StopBeforeShutdown).
+ * Where the node drives a robot, zero is sent before this ends, and before the process does by a signal or by the
+ * master (see StopBeforeShutdown).
  */
 class HostedNode
 {

@@ -67,8 +67,9 @@ struct ImageSourceParams
 std::vector<Parameter> parameters(ImageSourceParams& params);
 
 /**
- * Turns the ImageSource of a request into an image. Parameters: see parameters(ImageSourceParams&). Where `~allow_paths`
- * is on, requests may name files, which are read with the node's rights: turn it off where requests come from strangers.
+ * Turns the ImageSource of a request into an image. Parameters: see parameters(ImageSourceParams&). Where
+ * `~allow_paths` is on, requests may name files, which are read with the node's rights: turn it off where requests come
+ * from strangers.
  */
 class ImageSourceReader
 {

@@ -9,8 +9,8 @@
 namespace view_servo
 {
 /**
- * Publishes on `~markers`, latched. Markers are to be made only while somebody wants them; whoever subscribes later gets
- * those of the next image. Not for several threads at once, but for wanted().
+ * Publishes on `~markers`, latched. Markers are to be made only while somebody wants them; whoever subscribes later
+ * gets those of the next image. Not for several threads at once, but for wanted().
  */
 class MarkerOutput
 {

@@ -44,7 +44,7 @@ struct HomingScene
   std::string base_frame;                                              ///< the base's frame
   PlanarPose base;                                                     ///< the base's newest pose
   HomingReport report;                                                 ///< of the newest image
-  Course course;                                                       ///< the way that it goes
+  Course course;                                                       ///< of the base
   Camera camera;                                                       ///< that is there now
   std::string camera_frame;                                            ///< its optical frame
   Camera view_camera;                                                  ///< that the view was taken with

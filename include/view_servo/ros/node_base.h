@@ -36,8 +36,8 @@ double secondsBetween(const ros::Time& from, const ros::Time& to);
 double ageOf(const ros::Time& stamp);
 
 /**
- * To be appended to the fault of a message of this age [s]: what to do when the age shows that the message comes from a bag
- * while ROS' clock is not the bag's; else empty.
+ * To be appended to the fault of a message of this age [s]: what to do when the age shows that the message comes from a
+ * bag while ROS' clock is not the bag's; else empty.
  */
 std::string remedyOfAge(double age);
 

@@ -55,9 +55,15 @@ public:
     return frame_;
   }
 
-  /** @param delay by which odometry is still stamped later than images after the correction [s]; NaN: not known. */
+  /**
+   * Takes what was measured, for measuredDelay() and adviceOnDelay(); readings stay as they are.
+   * @param delay by which odometry's stamps are later than those of images of the same moment, after the correction by
+   * `~odometry_delay` [s]; NaN: not known.
+   */
   void setRemainingDelay(double delay);
-  /** How much later than images odometry is stamped in all, `~odometry_delay` included [s]; NaN while that is not known. */
+  /**
+   * How much later than images odometry is stamped in all, `~odometry_delay` included [s]; NaN while that is not known.
+   */
   double measuredDelay() const
   {
     return measured_delay_;

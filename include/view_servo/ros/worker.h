@@ -23,8 +23,8 @@ class Worker
 {
 public:
   /**
-   * @param what the thread does, in words, for the log. @param work called by the thread with all inputs; what it throws is
-   * logged.
+   * @param what the thread does, in words, for the log. @param work called by the thread with all inputs; what it
+   * throws is logged.
    */
   Worker(std::string what, std::function<void(Inputs&&)> work) : what_(std::move(what)), work_(std::move(work))
   {

@@ -19,7 +19,7 @@ namespace view_servo
 /** Options of HomographyAligner. */
 struct HomographyAlignerParams
 {
-  int max_points = 200;          ///< corners of the stored view that are looked for
+  int max_points = 200;          ///< most corners of the stored view that are looked for in an image
   int patch_radius = 10;         ///< patches of (2 r + 1)² pixels are compared; on coarse levels smaller ones
   int levels = 4;                ///< number of levels of the image pyramids, the image itself included, >= 1
   double min_correlation = 0.7;  ///< least correlation of a patch that counts as found again

@@ -26,8 +26,8 @@ struct PlaneFilterParams
   double window = 0.1;
   int max_measurements = 60;  ///< largest number of measurements that are averaged
   /**
-   * Of two decompositions, the one whose normals scatter more is dropped once their mean squared angle from their mean is
-   * this many times that of the other one's.
+   * Of two decompositions, the one whose normals scatter more is dropped once their mean squared angle from their mean
+   * is this many times that of the other one's.
    */
   double decision = 4.0;
 

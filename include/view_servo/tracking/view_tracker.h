@@ -27,7 +27,10 @@ struct ViewTrackerParams
   double max_residual = 2.0;
   int min_supporting = 15;    ///< least number of points that support a pose
   double min_support = 0.35;  ///< least share of the points looked for that have to support the pose, (0, 1]
-  /** Points whose images have grown or shrunk by a factor that differs by more than this part from the median are left out. */
+  /**
+   * Points whose images have grown or shrunk by a factor that differs by more than this part from the median are left
+   * out.
+   */
   double max_scale_difference = 0.35;
   double assumed_depth = 2.5;  ///< depth of points while nothing is known of it [m]
 
@@ -111,8 +114,8 @@ public:
     bool found = false;  ///< whether enough landmarks support a pose
     PlanarPose pose;     ///< valid when found
     /**
-     * Of (x, y, yaw) of the pose, as the supporting landmarks' residuals let one expect it when no more than 25 of them err
-     * independently; the structure is taken for exact. NaN unless found [unit of the structure, rad].
+     * Of (x, y, yaw) of the pose, as the supporting landmarks' residuals let one expect it when no more than 25 of them
+     * err independently; the structure is taken for exact. NaN unless found [unit of the structure, rad].
      */
     Eigen::Matrix3d covariance = Eigen::Matrix3d::Constant(std::numeric_limits<double>::quiet_NaN());
     /** track(): landmarks predicted to be in the image, in about its scale; locate(): those matched. */

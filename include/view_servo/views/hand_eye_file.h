@@ -18,7 +18,7 @@ struct HandEyeFile
   std::string base_frame;    ///< tf frame of the arm's base
   std::string flange_frame;  ///< tf frame of the flange that carries the camera
   std::string camera_frame;  ///< the camera's optical frame
-  Eigen::Isometry3d camera_in_flange = Eigen::Isometry3d::Identity();  ///< [m]
+  Eigen::Isometry3d camera_in_flange = Eigen::Isometry3d::Identity();  ///< optical frame's pose [m]
   std::vector<double> covariance;  ///< row-major 6x6, as HandEyeResult has it [m, rad]; may be empty
   std::string comment;             ///< one line; is written, not read
 };
@@ -48,9 +48,9 @@ struct HandEyePosesFile
 };
 
 /**
- * Reads a file as writeHandEyePosesFile() writes it: `parameters` as in a HandEyeFile; `camera_height`, if it is known; `view` with name, camera_matrix (9
- * numbers by rows) and corners (4 pairs); `poses`, each with flange (x, y, z, qx, qy, qz, qw) and homography (9 numbers by
- * rows, x_cur ~ H x_view).
+ * Reads a file as writeHandEyePosesFile() writes it: `parameters` as in a HandEyeFile; `camera_height`, if it is known;
+ * `view` with name, camera_matrix (9 numbers by rows) and corners (4 pairs); `poses`, each with flange (x, y, z, qx,
+ * qy, qz, qw) and homography (9 numbers by rows, x_cur ~ H x_view).
  * @throws std::runtime_error naming the file and what is wrong with it.
  */
 HandEyePosesFile readHandEyePosesFile(const std::string& path);

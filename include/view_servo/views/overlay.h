@@ -32,9 +32,10 @@ struct FollowedView
   cv::Rect region;  ///< region of the stored view that is tracked [px]
   /** x_cur ~ H x_ref [px]; NaN: the view was not found, and neither its outline nor its points are drawn. */
   Eigen::Matrix3d h = Eigen::Matrix3d::Constant(std::numeric_limits<double>::quiet_NaN());
-  Points found;    ///< points of the stored view that were found, at their places there [px]; drawn where h sends them
-  Points missing;  ///< points of the stored view that were not found, likewise
-  Points path;     ///< where the view's chosen point has been, in current pixels, newest last
+  Points found;  ///< points of the stored view that were found, at their places there [px]; drawn where h sends them
+  /** Points of the stored view that were not found, at their places there [px]; drawn where h sends them. */
+  Points missing;
+  Points path;       ///< where the view's chosen point has been, in current pixels, newest last
   std::string text;  ///< one line, drawn below
 };
 

@@ -41,7 +41,7 @@ struct PointViewMatcherParams
   RansacParams ransac;
   GeometryEstimator estimator = GeometryEstimator::RANSAC;     ///< how the geometry is found
   MultiHypothesisParams hypotheses;                            ///< `sampling` is chosen by `estimator`
-  ViewConsistency view_consistency = ViewConsistency::WITHIN;  ///< where five points are tested
+  ViewConsistency view_consistency = ViewConsistency::WITHIN;  ///< which sets of five matches are tested
   ViewConsistencyParams consistency;
   bool guided = true;  ///< look for more matches along the geometry found
   GuidedParams guidance;

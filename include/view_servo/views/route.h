@@ -29,7 +29,10 @@ struct Route
 /** Largest number of stops of a route. */
 constexpr std::size_t MAX_ROUTE_STOPS = 10000;
 
-/** Whether a name is one of a view (see isValidViewName()) and leaves room for the numbers of its views: 58 characters at most. */
+/**
+ * Whether a name is one of a view (see isValidViewName()) and leaves room for the numbers of its views: 58 characters
+ * at most.
+ */
 bool isValidRouteName(const std::string& name);
 
 /** The name that a recorder stores a route's view by: `ROUTE_001` for the number 1. */

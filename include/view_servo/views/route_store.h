@@ -20,15 +20,17 @@ public:
 };
 
 /**
- * Routes, one file `routes/NAME.yaml` each in the directory of their views, with a checksum in its last line. A route is
- * put in place, renamed and removed in one step, and after its views: a crash leaves it as it was or as it should be.
- * Routes do not share files; a damaged one is reported by name and the others stay usable. Several processes may use a
- * directory, as with ViewStore.
+ * Routes, one file `routes/NAME.yaml` each in the directory of their views, with a checksum in its last line. A route
+ * is put in place, renamed and removed in one step, and after its views: a crash leaves it as it was or as it should
+ * be. Routes do not share files; a damaged one is reported by name and the others stay usable. Several processes may
+ * use a directory, as with ViewStore.
  */
 class RouteStore
 {
 public:
-  /** @param views_directory the one of the ViewStore that holds the views; it need not exist until something is saved. */
+  /**
+   * @param views_directory the one of the ViewStore that holds the views; it need not exist until something is saved.
+   */
   explicit RouteStore(const std::filesystem::path& views_directory);
 
   /** Where the files of the routes are. */
@@ -43,8 +45,8 @@ public:
   }
 
   /**
-   * Saves a route whose views are stored already. @throws RouteStoreError when it was not saved: for a bad name, one that
-   * is in use, stops that cannot be, a view that is not there, or when writing fails, as on a full disk.
+   * Saves a route whose views are stored already. @throws RouteStoreError when it was not saved: for a bad name, one
+   * that is in use, stops that cannot be, a view that is not there, or when writing fails, as on a full disk.
    */
   void save(const Route& route) const;
 
@@ -64,10 +66,15 @@ public:
     std::vector<std::string> names;  ///< routes that load() would return, sorted
     std::vector<Damaged> damaged;    ///< sorted by name
   };
-  /** Reads all routes, but not the pictures of their views. @throws RouteStoreError when the directory cannot be read. */
+  /**
+   * Reads all routes, but not the pictures of their views. @throws RouteStoreError when the directory cannot be read.
+   */
   Listing list() const;
 
-  /** Gives a route another name; its views keep theirs. @throws RouteStoreError when there is none, or the name is in use. */
+  /**
+   * Gives a route another name; its views keep theirs. @throws RouteStoreError when there is none, or the name is in
+   * use.
+   */
   void rename(const std::string& from, const std::string& to) const;
 
   /**
@@ -79,8 +86,8 @@ public:
 
   /**
    * Copies a route with its views, and what has been learnt of them, to another directory of views.
-   * @throws RouteStoreError when the route or one of its views cannot be read, or a name is in use there; nothing is left
-   * there then.
+   * @throws RouteStoreError when the route or one of its views cannot be read, or a name is in use there; nothing is
+   * left there then.
    */
   void exportTo(const std::string& name, const std::filesystem::path& views_directory) const;
 

@@ -17,7 +17,10 @@ namespace view_servo
 struct SceneMotion
 {
   RelativePose pose;  ///< X_cur = R X_ref + t, t of length 1, as its true length is not known
-  /** Of rotation [rad] and t, as covarianceOf() gives it. Matches that lie near each other err alike, which is allowed for. */
+  /**
+   * Of rotation [rad] and t, as covarianceOf() gives it. Matches that lie near each other err alike, which is allowed
+   * for.
+   */
   Eigen::Matrix<double, 6, 6> covariance = Eigen::Matrix<double, 6, 6>::Zero();
   std::size_t inliers = 0;  ///< matches that agree with the motion
 };

@@ -26,9 +26,10 @@ struct StructurePose
 };
 
 /**
- * The pose of the camera that took the current image of a match, from what has been learnt of the view's depths: inliers
- * of the match that lie at points of the structure say where the camera is (cv::solvePnPRansac).
- * @param view with its calibration and pose, which tells how its camera was tilted: the z axis of ViewPose::frame is up.
+ * The pose of the camera that took the current image of a match, from what has been learnt of the view's depths:
+ * inliers of the match that lie at points of the structure say where the camera is (cv::solvePnPRansac).
+ * @param view with its calibration and pose, which tells how its camera was tilted: the z axis of ViewPose::frame is
+ * up.
  * @param current calibration of the camera that took the current image, without a fault.
  * @return empty where the view has no calibration or pose, and where fewer than 12 points, or less than half of them,
  * agree.

@@ -80,7 +80,10 @@ struct ViewMatch
   Eigen::Matrix3d matrix = Eigen::Matrix3d::Constant(std::numeric_limits<double>::quiet_NaN());
   std::vector<MatchedPoint> matches;  ///< all candidates, best first
   int inliers = 0;  ///< number of points, or for LineViewMatcher's H of lines, that agree with `matrix`
-  /** Root mean square over the inliers of the transfer error in one image (H) or the Sampson distance (F) [px]; NaN: none. */
+  /**
+   * Root mean square over the inliers of the transfer error in one image (H) or the Sampson distance (F) [px]; NaN:
+   * none.
+   */
   double rms_error = std::numeric_limits<double>::quiet_NaN();
   RansacStatistics ransac;        ///< of the attempt that succeeded, else of the last
   std::vector<StageTime> stages;  ///< in the order of their ends
@@ -95,7 +98,7 @@ struct ViewMatch
   /** @name Set by PointViewMatcher only; zero otherwise.
    * @{ */
   int reference_level = 0;  ///< level of the reference PreparedImage at which the geometry was found
-  int current_level = 0;    ///< the same of the current one
+  int current_level = 0;    ///< level of the current PreparedImage at which it was found
   /** @} */
 
   /** @name Set by LineViewMatcher and SceneMatcher; empty and NaN otherwise.

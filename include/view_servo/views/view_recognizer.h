@@ -69,13 +69,13 @@ struct CandidateView
   bool verified = false;          ///< the matcher found the scene of the view in the image
   int inliers = 0;                ///< matches that agree with what it found; 0 unless verified
   double log_significance = 0.0;  ///< as in ViewMatch; 0 unless verified
-  /** Where the camera is; empty unless verified, and where what has been learnt of the view does not tell it. */
+  /** Where the camera is, seen from the view; empty unless verified, and while too few depths of the view are known. */
   std::optional<StructurePose> pose;
 };
 
 /**
- * Says which of many views an image shows: a ViewIndex names the most likely ones, and SceneMatcher verifies them. Safe to
- * use from several threads.
+ * Says which of many views an image shows: a ViewIndex names the most likely ones, and SceneMatcher verifies them. Safe
+ * to use from several threads.
  */
 class ViewRecognizer
 {
@@ -102,8 +102,9 @@ public:
     std::vector<std::string> unreadable;
   };
   /**
-   * Adds the source's new and changed views to the index and removes those that are gone. Takes little time when nothing
-   * has changed. @param most views that are read at most. @throws std::runtime_error when the source cannot be listed.
+   * Adds the source's new and changed views to the index and removes those that are gone. Takes little time when
+   * nothing has changed. @param most views that are read at most. @throws std::runtime_error when the source cannot be
+   * listed.
    */
   Update update(std::size_t most);
 
@@ -128,8 +129,8 @@ public:
 
   /**
    * Takes over the saved index. Views that changed since it was saved are left to update().
-   * @return why there is nothing to be taken over, in one line, such as a damaged or missing file; the index is then as it
-   * was, and update() makes it anew. Empty: it was taken over.
+   * @return why there is nothing to be taken over, in one line, such as a damaged or missing file; the index is then as
+   * it was, and update() makes it anew. Empty: it was taken over.
    */
   std::string loadIndex();
 

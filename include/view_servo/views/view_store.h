@@ -93,8 +93,8 @@ public:
   /**
    * Stores what has been learnt of a view, instead of what was known before.
    * @param revision that it belongs to: of a view that has been saved anew meanwhile, nothing is stored.
-   * @return whether it was stored. @throws ViewStoreError when there is no such view, or when writing fails; the view is
-   * as it was then.
+   * @return whether it was stored. @throws ViewStoreError when there is no such view, or when writing fails; the view
+   * is as it was then.
    */
   bool saveStructure(const std::string& name, const std::string& revision, const ViewStructure& structure) const;
 

@@ -14,7 +14,8 @@ struct StructurePoint
 {
   Eigen::Vector2d pixel = Eigen::Vector2d::Zero();  ///< in the stored image, with the lens's distortion [px]
   double inverse_depth = 0.0;  ///< > 0: 1 / depth along the axis of the view's level camera (planar_motion.h) [1/m]
-  double information = 0.0;    ///< > 0: 1 / variance of inverse_depth, for errors of 1 in level points [m²]
+  /** > 0: 1 / variance of inverse_depth if level points had a standard deviation of 1 [m²]. */
+  double information = 0.0;
 };
 
 /** What has been learnt of where the things are that a stored view shows. */

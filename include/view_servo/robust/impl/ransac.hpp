@@ -44,7 +44,9 @@ private:
 /** Samples needed for one free of outliers with the given confidence (thesis eq. 9.5); possibly infinite. */
 double requiredSamples(double inlier_ratio, int sample_size, double confidence);
 
-/** Truncated squared errors of all data (MSAC, Torr & Zisserman 2000), in random order so that most models fail early. */
+/**
+ * Truncated squared errors of all data (MSAC, Torr & Zisserman 2000), in random order so that most models fail early.
+ */
 template <typename Estimator>
 class MsacConsensus : public Consensus<typename Estimator::Model>
 {
@@ -219,8 +221,8 @@ private:
   }
 
   /**
-   * Solves and scores a sample; optimises it locally when it is the best so far, unless it is one of the first, of which
-   * only the best is. Whether the result improved.
+   * Solves and scores a sample; optimises it locally when it is the best so far, unless it is one of the first, of
+   * which only the best is. Whether the result improved.
    */
   bool trySample(const std::vector<int>& sample)
   {
