@@ -31,7 +31,18 @@ namespace view_servo
 {
 namespace
 {
-constexpr std::array<const char*, 2> ARM_WORLDS = { "rice", "mouse" };
+/** What is servoed to, and how. */
+struct ArmTask
+{
+  std::array<const char*, 2> worlds;
+  Target target;
+  double matching_time;    ///< [s]
+  double near_enough;      ///< what says converged and is further off is wrong [m]
+  double straight_enough;  ///< likewise [rad]
+};
+
+const ArmTask PLANES{ { "rice", "mouse" }, Target::PLANE, 0.3, 0.005, 0.5 / DEGREES };
+const ArmTask SCENES{ { "parts", "rack" }, Target::SCENE, 0.6, 0.002, 0.2 / DEGREES };
 constexpr std::array<const char*, 3> STARTS = { "near", "far", "extreme" };
 
 /** One run of servoing. */
@@ -54,10 +65,12 @@ struct Row
   std::vector<double> degrees;
 };
 
-sim::ArmTrialParams paramsOf(const ArmRun& run, const sim::World& world)
+sim::ArmTrialParams paramsOf(const ArmTask& task, const ArmRun& run, const sim::World& world)
 {
   Rng rng(run.seed);
   sim::ArmTrialParams params;
+  params.target = task.target;
+  params.matching_time = task.matching_time;
   params.seed = run.seed;
   params.conditions.image_noise = 2.0;
   params.conditions.encoder_noise = 1e-4;
@@ -103,11 +116,11 @@ struct Result
 };
 
 /** All runs, those from the same start beside each other. */
-std::vector<ArmRun> runsOf(const ExperimentContext& context)
+std::vector<ArmRun> runsOf(const ArmTask& task, const ExperimentContext& context)
 {
   const int runs_each = context.runsOf(ARM_RUNS);
   std::vector<ArmRun> runs;
-  for (const char* world : ARM_WORLDS)
+  for (const char* world : task.worlds)
   {
     for (const char* start : STARTS)
     {
@@ -120,10 +133,10 @@ std::vector<ArmRun> runsOf(const ExperimentContext& context)
   return runs;
 }
 
-Result servo(const ArmRun& run, const sim::World& world, const std::string& urdf)
+Result servo(const ArmTask& task, const ArmRun& run, const sim::World& world, const std::string& urdf)
 {
   const Eigen::Isometry3d start = startOf(run, world);
-  sim::ArmTrials trials(world, urdf, paramsOf(run, world));
+  sim::ArmTrials trials(world, urdf, paramsOf(task, run, world));
   double least_margin = world.camera.width;
   const sim::ArmOutcome outcome = trials.run(start, [&](const sim::ArmStep& step) {
     const Eigen::Vector2d& point = step.report.point;
@@ -151,26 +164,24 @@ std::string lineOf(const ArmRun& run, const Result& result)
   return line.str();
 }
 
-void add(const sim::ArmOutcome& outcome, Row& row)
+void add(const ArmTask& task, const sim::ArmOutcome& outcome, Row& row)
 {
-  constexpr double NEAR_ENOUGH = 0.005;              // [m]: what says converged and is further off is wrong
-  constexpr double STRAIGHT_ENOUGH = 0.5 / DEGREES;  // [rad]
   ++row.runs;
   if (!outcome.converged)
   {
     ++row.failures;
     return;
   }
-  row.wrong += outcome.translation_error > NEAR_ENOUGH || outcome.rotation_error > STRAIGHT_ENOUGH ? 1 : 0;
+  row.wrong += outcome.translation_error > task.near_enough || outcome.rotation_error > task.straight_enough ? 1 : 0;
   row.millimetres.push_back(1e3 * outcome.translation_error);
   row.degrees.push_back(DEGREES * outcome.rotation_error);
 }
 
 /** @param table a row for each world and start, named "WORLD START". */
-void print(std::map<std::string, Row>& table)
+void print(const ArmTask& task, std::map<std::string, Row>& table)
 {
   std::printf("%-14s %8s %6s %9s %6s %9s %6s\n", "", "failures", "wrong", "pos [mm]", "std", "ang [deg]", "std");
-  for (const char* world : ARM_WORLDS)
+  for (const char* world : task.worlds)
   {
     for (const char* start : STARTS)
     {
@@ -186,25 +197,23 @@ void print(std::map<std::string, Row>& table)
   }
 }
 
-}  // namespace
-
-void runArmExperiment(const ExperimentContext& context, std::ostream& csv)
+void runTask(const ArmTask& task, const ExperimentContext& context, std::ostream& csv)
 {
   std::ifstream urdf_file = openForReading(packageFolder() / "urdf" / "puma560.urdf");
   const std::string urdf{ std::istreambuf_iterator<char>(urdf_file), std::istreambuf_iterator<char>() };
-  const Worlds worlds = readShippedWorlds({ ARM_WORLDS.begin(), ARM_WORLDS.end() });
-  const std::vector<ArmRun> runs = runsOf(context);
+  const Worlds worlds = readShippedWorlds({ task.worlds.begin(), task.worlds.end() });
+  const std::vector<ArmRun> runs = runsOf(task, context);
   std::vector<std::string> lines(runs.size());
   std::map<std::string, Row> table;
   std::mutex mutex;
   std::size_t done = 0;
   inParallel(runs.size(), context.threads, [&](std::size_t i) {
     const ArmRun& run = runs[i];
-    const Result result = servo(run, worlds.at(run.world), urdf);
+    const Result result = servo(task, run, worlds.at(run.world), urdf);
     const std::lock_guard<std::mutex> lock(mutex);
     lines[i] = lineOf(run, result);
     std::cerr << ++done << " of " << runs.size() << ": " << lines[i] << std::flush;
-    add(result.outcome, table[run.world + " " + run.start]);
+    add(task, result.outcome, table[run.world + " " + run.start]);
   });
 
   csv << "world,start,index,light,start_distance_mm,start_turn_deg,converged,translation_error_mm,rotation_error_deg,"
@@ -213,7 +222,19 @@ void runArmExperiment(const ExperimentContext& context, std::ostream& csv)
   {
     csv << line;
   }
-  print(table);
+  print(task, table);
+}
+
+}  // namespace
+
+void runArmExperiment(const ExperimentContext& context, std::ostream& csv)
+{
+  runTask(PLANES, context, csv);
+}
+
+void runArmSceneExperiment(const ExperimentContext& context, std::ostream& csv)
+{
+  runTask(SCENES, context, csv);
 }
 
 }  // namespace view_servo

@@ -77,6 +77,7 @@ const std::vector<Experiment>& experiments()
       STRUCTURE_STARTS, runStructureExperiment },
     { "routes", "routes through simulated rooms, recorded and followed", false, ROUTES, runRoutesExperiment },
     { "arm", "table 8.1: servoing of a simulated arm, from many starts", false, ARM_RUNS, runArmExperiment },
+    { "arm_scene", "the same with views of scenes that have depth", false, ARM_RUNS, runArmSceneExperiment },
     { "homing_directions", "the heading between real views of a room", true, DIRECTION_DRAWS, runDirectionsExperiment },
     { "multi_hypothesis", "table 9.1, figures 9.1 to 9.6: several hypotheses a point, simulated", false,
       HYPOTHESIS_SCENES, runMultiHypothesisExperiment },

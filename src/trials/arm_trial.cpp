@@ -6,6 +6,7 @@
 #include "trials/trial.h"
 #include "view_servo/geometry/region.h"
 #include "view_servo/tracking/plane_finder.h"
+#include "view_servo/tracking/scene_finder.h"
 #include "view_servo/views/prepared_image.h"
 
 #include <memory>
@@ -29,8 +30,9 @@ struct StampedTrack
 /** Where matching finds the view. */
 struct Found
 {
-  std::optional<Eigen::Matrix3d> h;  // view to image; empty: nowhere
-  Eigen::Isometry3d camera_in_base;  // when the image was taken
+  std::optional<Eigen::Matrix3d> h;          // of a plane, view to image; empty: nowhere
+  std::optional<SceneFinder::Answer> scene;  // of a search for a scene; empty: it was one for a plane
+  Eigen::Isometry3d camera_in_base;          // when the image was taken
 };
 
 Puma makePuma(const std::string& urdf_xml, const ArmTrialParams& params)
@@ -64,12 +66,15 @@ struct ArmTrials::Parts
   Parts(const World& world, std::uint64_t seed)
     : finder(PointViewMatcherParams()),
       view(std::make_shared<const PreparedImage>(SimulatedCamera(world, {}, seed).capture(world.goal), world.region,
-                                                 finder.features()))
+                                                 finder.features())),
+      scene_view(std::make_shared<const PreparedImage>(view->grey(), view->region(), scene_finder.features()))
   {
   }
 
   PlaneFinder finder;
+  SceneFinder scene_finder;
   std::shared_ptr<const PreparedImage> view;
+  std::shared_ptr<const PreparedImage> scene_view;  // the same, with what a search for a scene needs
 };
 
 ArmTrials::ArmTrials(const World& world, const std::string& urdf_xml, const ArmTrialParams& params)
@@ -95,9 +100,9 @@ public:
       puma_(makePuma(urdf_xml, params)),
       camera_(world, params.conditions.groups, params.seed + 1),
       camera_in_described_(params.conditions.calibrated_camera.value_or(Eigen::Isometry3d::Identity())),
-      k_(withFocalLengthError(world.camera, params.conditions.focal_length_error).k),
-      tracker_(parts.view->grey(), world.region, k_, params.tracker),
-      servo_(targetOf(world, k_), params.servo),
+      calibrated_(withFocalLengthError(world.camera, params.conditions.focal_length_error)),
+      tracker_(parts.view->grey(), world.region, calibrated_.k, params.tracker, params.target),
+      servo_(targetOf(world, calibrated_.k), params.servo),
       limiter_(params.limits),
       control_due_(params.control_period),
       image_due_(1.0 / world.camera_rate)
@@ -156,9 +161,13 @@ private:
     const cv::Mat image = takeImage();
     if (const std::optional<Found> found = found_.take(time_))
     {
-      if (found->h)
+      if (found->scene)
       {
-        tracker_.start(*found->h, found->camera_in_base);
+        tracker_.addSceneSearch(*found->scene, found->camera_in_base);
+      }
+      else
+      {
+        tracker_.addPlaneSearch(found->h, found->camera_in_base);
       }
     }
     const PlaneTrack& track = tracker_.add(image, camera_in_base);
@@ -166,16 +175,25 @@ private:
     {
       last_h_ = track.homography.h;
     }
-    else if (found_.empty())
+    if (found_.empty() && tracker_.wanted() != TargetTracker::Search::NONE)
     {
-      const PlaneFinder::Answer answer = parts_.finder.find({ parts_.view, image, last_h_ });
-      found_.add(time_ + params_.matching_time, { answer.h, camera_in_base });
+      found_.add(time_ + params_.matching_time, search(image, camera_in_base));
     }
     tracks_.add(time_ + params_.image_delay, { time_, track });
     if (on_step_)
     {
       on_step_({ time_, image, cameraPose(), track, servo_.report(), sent_ });
     }
+  }
+
+  Found search(const cv::Mat& image, const Eigen::Isometry3d& camera_in_base) const
+  {
+    if (tracker_.wanted() == TargetTracker::Search::PLANE)
+    {
+      return { parts_.finder.find({ parts_.view, image, last_h_ }).h, std::nullopt, camera_in_base };
+    }
+    return { std::nullopt, parts_.scene_finder.find({ parts_.scene_view, calibrated_, image, calibrated_ }),
+             camera_in_base };
   }
 
   void deliverTracks()
@@ -237,8 +255,8 @@ private:
   Puma puma_;
   SimulatedCamera camera_;
   Eigen::Isometry3d camera_in_described_;  // as tf has it
-  Eigen::Matrix3d k_;                      // as the calibration has it
-  PlaneTracker tracker_;
+  Camera calibrated_;                      // as the calibration has it
+  TargetTracker tracker_;
   Servo25d servo_;
   TwistLimiter limiter_;
   Every control_due_;

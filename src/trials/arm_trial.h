@@ -7,6 +7,7 @@
 #include "view_servo/control/servo_25d.h"
 #include "view_servo/control/velocity_limiter.h"
 #include "view_servo/tracking/plane_tracker.h"
+#include "view_servo/tracking/target_tracker.h"
 
 #include <Eigen/Geometry>
 #include <opencv2/core/mat.hpp>
@@ -42,6 +43,7 @@ struct ArmConditions
 struct ArmTrialParams
 {
   PlaneTrackerParams tracker;
+  Target target = Target::PLANE;  ///< what the view is taken to show
   Servo25dParams servo;
   VelocityLimits limits = ARM_LIMITS;
   ArmConditions conditions;

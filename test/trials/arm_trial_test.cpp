@@ -89,6 +89,29 @@ TEST(ArmTrial, ConvergesOnTheMouseUnderHardConditionsAmongDistractors)
   expectAtView(ArmTrials(world, pumaUrdf(), params).run(world.start("extreme")));
 }
 
+/** What it does not know it finds out, too: that the view has depth. */
+TEST(ArmTrial, ConvergesOnThePartsUnderHardConditionsAmongDistractors)
+{
+  const World world = readWorld(test::worldFile("parts"));
+  ArmTrialParams params;
+  params.conditions = hardConditions();
+  params.conditions.groups = { "distractors" };
+  for (const Target target : { Target::SCENE, Target::AUTO })
+  {
+    params.target = target;
+    expectAtView(ArmTrials(world, pumaUrdf(), params).run(world.start("extreme")));
+  }
+}
+
+TEST(ArmTrial, ConvergesOnTheRackUnderHardConditions)
+{
+  const World world = readWorld(test::worldFile("rack"));
+  ArmTrialParams params;
+  params.conditions = hardConditions();
+  params.target = Target::SCENE;
+  expectAtView(ArmTrials(world, pumaUrdf(), params).run(world.start("far")));
+}
+
 /** It stands while nothing is seen, and goes on. */
 TEST(ArmTrial, OutlivesACover)
 {
