@@ -90,13 +90,18 @@ struct Servo25d::Task
 
   explicit Task(const Servo25dParams& params)
   {
-    constexpr double SLOPE = 8.0;  // of the gain where there is no error [1/s]
     servo.setServo(vpServo::EYEINHAND_CAMERA);
     servo.setInteractionMatrixType(vpServo::CURRENT, vpServo::PSEUDO_INVERSE);
-    servo.setLambda(vpAdaptiveGain(params.near_gain, params.gain, SLOPE));
+    setGains(params);
     servo.addFeature(point, wanted_point);
     servo.addFeature(depth);
     servo.addFeature(turn);
+  }
+
+  void setGains(const Servo25dParams& params)
+  {
+    constexpr double SLOPE = 8.0;  // of the gain where there is no error [1/s]
+    servo.setLambda(vpAdaptiveGain(params.near_gain, params.gain, SLOPE));
   }
 };
 
@@ -204,6 +209,16 @@ void Servo25d::addLoss(double stamp, const std::string& reason)
   }
   report_.state = view_ ? ServoState::LOST : ServoState::ACQUIRING;
   report_.reason = reason;
+}
+
+void Servo25d::setGains(double gain, double near_gain)
+{
+  Servo25dParams params = params_;
+  params.gain = gain;
+  params.near_gain = near_gain;
+  requireNoFaults("parameters of 2.5D servoing", params.validate());
+  params_ = params;
+  task_->setGains(params_);
 }
 
 void Servo25d::sent(double time, const Twist& twist)

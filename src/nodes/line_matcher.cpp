@@ -15,6 +15,7 @@
 #include <limits>
 #include <stdexcept>
 #include <string>
+#include <vector>
 
 namespace view_servo
 {
@@ -51,6 +52,12 @@ public:
 
   explicit LineMatching(const Params& params) : matcher_(params)
   {
+  }
+
+  static std::vector<std::string> thresholds()
+  {
+    return { "inlier_threshold", "min_significance", "min_correlation", "min_mean_correlation",
+             "plane_threshold",  "min_quality",      "min_parallax" };
   }
 
   FeatureParams features() const

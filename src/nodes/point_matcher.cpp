@@ -16,6 +16,7 @@
 #include <limits>
 #include <stdexcept>
 #include <string>
+#include <vector>
 
 namespace view_servo
 {
@@ -53,6 +54,11 @@ public:
 
   explicit PointMatching(const Params& params) : matcher_(params)
   {
+  }
+
+  static std::vector<std::string> thresholds()
+  {
+    return { "inlier_threshold", "min_significance", "patch_correlation", "min_parallax" };
   }
 
   FeatureParams features() const

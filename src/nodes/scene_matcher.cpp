@@ -22,6 +22,7 @@
 #include <optional>
 #include <stdexcept>
 #include <string>
+#include <vector>
 
 namespace view_servo
 {
@@ -145,6 +146,12 @@ public:
 
   explicit SceneMatching(const Params& params) : matcher_(params)
   {
+  }
+
+  static std::vector<std::string> thresholds()
+  {
+    return { "scene_threshold",  "scene_significance",    "plane_correlation",    "inlier_threshold",
+             "min_significance", "line_inlier_threshold", "line_min_significance" };
   }
 
   FeatureParams features() const

@@ -157,6 +157,7 @@ public:
   ServoDriver(DriverContext& context, const Params& params)
     : context_(context),
       params_(params),
+      live_(params.servo),
       joints_(jointLimits(context.nodeHandle().param<std::string>("robot_description", "")), params.joint_margin,
               params.joint_timeout),
       homographies_(context.addInput("homography", context.quoted("homography"), params.homography_timeout)),
@@ -164,6 +165,7 @@ public:
       store_(viewsDir(params.views_dir)),
       answer_("homographies", context.resolved("homography"))
   {
+    context.addLive(liveNumbers());
     ros::NodeHandle& nh = context.nodeHandle();
     command_publisher_ = nh.advertise<geometry_msgs::TwistStamped>(context.commandTopic(), 1);
     error_publisher_ = nh.advertise<ServoError>("servo_error", 5);
@@ -211,6 +213,7 @@ public:
   void begin(std::unique_ptr<Task> task)
   {
     task_ = std::move(task);
+    setGains(*task_);  // they may have been changed since it was prepared
     task_->start = Clock::now();
     homographies_.setNeeded(true);
     camera_frame_ = withoutSlash(info_->header.frame_id);
@@ -347,7 +350,7 @@ private:
 
   ServoStage makeStage(const StoredView& stored, const Camera& camera, const ServoView& wanted) const
   {
-    Servo25dParams params = params_.servo;
+    Servo25dParams params = context_.locked([this] { return live_; });
     const auto set = [](double value, double& param) {
       param = value > 0.0 ? value : param;
     };
@@ -362,6 +365,34 @@ private:
     catch (const std::invalid_argument& error)
     {
       throw std::invalid_argument("view '" + stored.name + "': " + error.what());
+    }
+  }
+
+  /** The parameters that may be changed while the node runs: gains at once, tolerances from the next goal on. */
+  LiveGroup liveNumbers()
+  {
+    Servo25dParams started = params_.servo;
+    std::vector<LiveNumber> numbers = aroundNow(parameters(started), { "gain", "near_gain" }, LIVE_GAIN);
+    const std::vector<LiveNumber> tolerances =
+        aroundNow(parameters(started), { "translation_tolerance", "rotation_tolerance" }, LIVE_TOLERANCE);
+    numbers.insert(numbers.end(), tolerances.begin(), tolerances.end());
+    return liveGroup<Servo25dParams>(started, numbers, [this](const Servo25dParams& live) {
+      context_.locked([&] {
+        live_ = live;
+        if (task_)
+        {
+          setGains(*task_);
+        }
+      });
+    });
+  }
+
+  /** Gives a goal's views the present gains. */
+  void setGains(const Task& task) const
+  {
+    for (const ServoStage& stage : task.stages)
+    {
+      stage.servo->setGains(live_.gain, live_.near_gain);
     }
   }
 
@@ -511,6 +542,7 @@ private:
 
   DriverContext& context_;
   const Params params_;
+  Servo25dParams live_;  // with what people have changed since
   JointGuard joints_;
   DriverInput& homographies_;
   DriverInput& joint_states_;

@@ -6,7 +6,12 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstddef>
+#include <limits>
+#include <locale>
+#include <sstream>
 #include <stdexcept>
+#include <tuple>
 #include <utility>
 
 namespace view_servo
@@ -24,10 +29,8 @@ dynamic_reconfigure::GroupState groupState()
   return state;
 }
 
-}  // namespace
-
-std::vector<LiveNumber> upToNow(const std::vector<Parameter>& table, const std::vector<std::string>& names,
-                                double least)
+/** The named rows as numbers that must stay as they are. */
+std::vector<LiveNumber> numbersOf(const std::vector<Parameter>& table, const std::vector<std::string>& names)
 {
   std::vector<LiveNumber> numbers;
   for (const std::string& name : names)
@@ -38,13 +41,49 @@ std::vector<LiveNumber> upToNow(const std::vector<Parameter>& table, const std::
       throw std::invalid_argument("there is no number called " + name);
     }
     const double now = row->number();
-    numbers.push_back({ name, row->description + " [" + row->unit + "]", now, std::min(least, now), now });
+    numbers.push_back({ name, row->description + (row->unit.empty() ? "" : " [" + row->unit + "]"), now, now, now });
   }
   return numbers;
 }
 
-LiveParameters::LiveParameters(const ros::NodeHandle& private_nh, std::vector<LiveNumber> numbers, Apply apply)
-  : numbers_(std::move(numbers)), apply_(std::move(apply)), nh_(private_nh)
+}  // namespace
+
+std::vector<LiveNumber> upToNow(const std::vector<Parameter>& table, const std::vector<std::string>& names,
+                                double least)
+{
+  std::vector<LiveNumber> numbers = numbersOf(table, names);
+  for (LiveNumber& number : numbers)
+  {
+    number.least = std::min(least, number.value);
+  }
+  return numbers;
+}
+
+std::vector<LiveNumber> aroundNow(const std::vector<Parameter>& table, const std::vector<std::string>& names,
+                                  const LiveSpan& span)
+{
+  std::vector<LiveNumber> numbers = numbersOf(table, names);
+  for (LiveNumber& number : numbers)
+  {
+    std::tie(number.least, number.most) = std::minmax({ span.least * number.value, span.most * number.value });
+  }
+  return numbers;
+}
+
+void setNumbers(const std::vector<Parameter>& table, const std::vector<LiveNumber>& numbers)
+{
+  for (const LiveNumber& number : numbers)
+  {
+    std::ostringstream text;
+    text.imbue(std::locale::classic());
+    text.precision(std::numeric_limits<double>::max_digits10);
+    text << number.value;
+    setParameter(table, number.name, text.str());
+  }
+}
+
+LiveParameters::LiveParameters(const ros::NodeHandle& private_nh, std::vector<LiveGroup> groups)
+  : groups_(std::move(groups)), nh_(private_nh)
 {
   descriptions_ = nh_.advertise<dynamic_reconfigure::ConfigDescription>("parameter_descriptions", 1, true);
   updates_ = nh_.advertise<dynamic_reconfigure::Config>("parameter_updates", 1, true);
@@ -68,37 +107,66 @@ void LiveParameters::change(const dynamic_reconfigure::Config& wanted)
   {
     ROS_WARN_STREAM("what may be changed while " << nh_.getNamespace() << " runs are numbers of type double alone");
   }
+  std::vector<LiveGroup> changed = groups_;
   for (const dynamic_reconfigure::DoubleParameter& parameter : wanted.doubles)
   {
-    const auto number = std::find_if(numbers_.begin(), numbers_.end(),
-                                     [&](const LiveNumber& each) { return each.name == parameter.name; });
-    if (number == numbers_.end() || !std::isfinite(parameter.value))
+    LiveNumber* number = find(changed, parameter.name);
+    if (number == nullptr || !std::isfinite(parameter.value))
     {
       ROS_WARN_STREAM("'" << parameter.name << "' stays as it is: "
-                          << (number == numbers_.end() ? "it cannot be changed while the node runs, or is none of its "
-                                                         "parameters"
-                                                       : "no finite number was given"));
+                          << (number == nullptr ? "it cannot be changed while the node runs, or is none of its "
+                                                  "parameters"
+                                                : "no finite number was given"));
       continue;
     }
     number->value = std::clamp(parameter.value, number->least, number->most);
     if (number->value != parameter.value)
     {
       ROS_WARN_STREAM(parameter.name << " is " << number->value << " instead of " << parameter.value
-                                     << ", which is beyond what the node was started with");
+                                     << ": by what the node was started with, it may be " << number->least << " to "
+                                     << number->most);
     }
   }
-  apply_(numbers_);
+  for (std::size_t i = 0; i < groups_.size(); ++i)
+  {
+    const std::string fault = changed[i].fault(changed[i].numbers);
+    if (!fault.empty())
+    {
+      ROS_WARN_STREAM("nothing is changed that goes together with this: " << fault);
+      continue;
+    }
+    groups_[i].numbers = changed[i].numbers;
+    groups_[i].apply(groups_[i].numbers);
+  }
+}
+
+LiveNumber* LiveParameters::find(std::vector<LiveGroup>& groups, const std::string& name)
+{
+  for (LiveGroup& group : groups)
+  {
+    for (LiveNumber& number : group.numbers)
+    {
+      if (number.name == name)
+      {
+        return &number;
+      }
+    }
+  }
+  return nullptr;
 }
 
 dynamic_reconfigure::Config LiveParameters::config(double LiveNumber::*value) const
 {
   dynamic_reconfigure::Config result;
-  for (const LiveNumber& number : numbers_)
+  for (const LiveGroup& group : groups_)
   {
-    dynamic_reconfigure::DoubleParameter parameter;
-    parameter.name = number.name;
-    parameter.value = number.*value;
-    result.doubles.push_back(parameter);
+    for (const LiveNumber& number : group.numbers)
+    {
+      dynamic_reconfigure::DoubleParameter parameter;
+      parameter.name = number.name;
+      parameter.value = number.*value;
+      result.doubles.push_back(parameter);
+    }
   }
   result.groups.push_back(groupState());
   return result;
@@ -107,17 +175,20 @@ dynamic_reconfigure::Config LiveParameters::config(double LiveNumber::*value) co
 dynamic_reconfigure::ConfigDescription LiveParameters::description() const
 {
   dynamic_reconfigure::ConfigDescription result;
-  dynamic_reconfigure::Group group;
-  group.name = GROUP;
-  for (const LiveNumber& number : numbers_)
+  dynamic_reconfigure::Group all;
+  all.name = GROUP;
+  for (const LiveGroup& group : groups_)
   {
-    dynamic_reconfigure::ParamDescription parameter;
-    parameter.name = number.name;
-    parameter.type = "double";
-    parameter.description = number.description;
-    group.parameters.push_back(parameter);
+    for (const LiveNumber& number : group.numbers)
+    {
+      dynamic_reconfigure::ParamDescription parameter;
+      parameter.name = number.name;
+      parameter.type = "double";
+      parameter.description = number.description;
+      all.parameters.push_back(parameter);
+    }
   }
-  result.groups.push_back(group);
+  result.groups.push_back(all);
   result.min = config(&LiveNumber::least);
   result.max = config(&LiveNumber::most);
   result.dflt = config(&LiveNumber::value);

@@ -50,6 +50,8 @@ ViewHoming::ViewHoming(DriverContext& context, const HomingDriverParams& params,
     store_(viewsDir(params.views_dir)),
     output_(context.nodeHandle(), context.commandTopic(), base_frame_),
     markers_(context.privateNodeHandle()),
+    distance_tolerance_(params.homing.approach.distance_tolerance),
+    yaw_tolerance_(params.homing.approach.yaw_tolerance),
     worker_(
         [this](const HomingOutcome& outcome) {
           context_.runLocked("the outcome of an image", [&] { onOutcome(outcome); });
@@ -72,6 +74,7 @@ ViewHoming::ViewHoming(DriverContext& context, const HomingDriverParams& params,
         },
         [this](const std::string& problem) { context_.locked([&] { images_.reject(problem); }); })
 {
+  context_.addLive(liveNumbers());
   images_.setMaxAge(params.camera.max_image_age);
   matches_.followPace(3.0);
   context.diagnostics().add("camera", &camera_, &CameraInput::diagnose);
@@ -80,6 +83,21 @@ ViewHoming::ViewHoming(DriverContext& context, const HomingDriverParams& params,
   });
   context.listen<LineMatches>(
       "line_matches", 1, [this](const LineMatches::ConstPtr& m) { onMatches(lines_.add(*m), m->header, m->points); });
+}
+
+LiveGroup ViewHoming::liveNumbers()
+{
+  HomingParams started = params_.homing;
+  std::vector<LiveNumber> numbers = aroundNow(parameters(started), { "gain", "turn_gain" }, LIVE_GAIN);
+  const std::vector<LiveNumber> tolerances =
+      aroundNow(parameters(started), { "distance_tolerance", "yaw_tolerance" }, LIVE_TOLERANCE);
+  numbers.insert(numbers.end(), tolerances.begin(), tolerances.end());
+  return liveGroup<HomingParams>(started, numbers, [this](const HomingParams& live) {
+    gain_share_ = live.approach.gain / params_.homing.approach.gain;
+    turn_gain_share_ = live.approach.turn_gain / params_.homing.approach.turn_gain;
+    distance_tolerance_ = live.approach.distance_tolerance;
+    yaw_tolerance_ = live.approach.yaw_tolerance;
+  });
 }
 
 // ------------------------------------------------------------------------------------------------- what a goal needs
@@ -118,7 +136,10 @@ std::shared_ptr<HomingTask> ViewHoming::makeTask(const LearntView& stored, const
 {
   const geometry_msgs::TransformStamped base_from_camera =
       transforms_.lookUp(base_frame_, frame.image->header.frame_id, ros::Time(0), 0.0);
-  return makeHomingTask(stored, frame.info, toIsometry(base_from_camera.transform), params);
+  HomingParams live = params;
+  live.approach.distance_tolerance = distance_tolerance_;
+  live.approach.yaw_tolerance = yaw_tolerance_;
+  return makeHomingTask(stored, frame.info, toIsometry(base_from_camera.transform), live);
 }
 
 // ------------------------------------------------------------------------------------------------ the task, control
@@ -161,7 +182,14 @@ void ViewHoming::needMatches(bool needed)
 
 BaseVelocity ViewHoming::follow(const Course& course) const
 {
-  return base_in_odom_ && odd_stamps_ == 0 ? along(course, *base_in_odom_) : BaseVelocity(BaseVelocity::Zero());
+  if (!base_in_odom_ || odd_stamps_ > 0)
+  {
+    return BaseVelocity::Zero();
+  }
+  Course live = course;
+  live.gain *= gain_share_;
+  live.turn_gain *= turn_gain_share_;
+  return along(live, *base_in_odom_);
 }
 
 std::optional<double> ViewHoming::takeLatency()

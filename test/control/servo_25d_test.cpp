@@ -374,6 +374,23 @@ RC_GTEST_PROP(Servo25d, ConvergesWithTheDistanceWrongByAFactorOfThree, (std::uin
   }
 }
 
+TEST(Servo25d, TakesOtherGainsWhileItDrives)
+{
+  Servo25dParams params;
+  params.gain = params.near_gain = 1.0;
+  const auto twist = [&](double gain) {
+    Servo25d servo(target(), params);
+    servo.add({ 1.0, { Eigen::Matrix3d::Identity(), { 0.02, 0.01, 0.1 }, Eigen::Vector3d::UnitZ() }, DISTANCE, 50 });
+    servo.setGains(gain, gain);
+    return servo.command(1.0);
+  };
+  EXPECT_GT(twist(1.0).norm(), 0.01);
+  EXPECT_LT((twist(2.5) - 2.5 * twist(1.0)).norm(), 1e-9);
+  Servo25d servo(target(), params);
+  EXPECT_THROW(servo.setGains(2.0, 1.0), std::invalid_argument) << "near_gain is the smaller one";
+  EXPECT_THROW(servo.setGains(0.0, 1.0), std::invalid_argument);
+}
+
 TEST(Servo25d, NumbersThatAreNoneDriveNothing)
 {
   Servo25d servo(target(), Servo25dParams());

@@ -2,13 +2,14 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include "change_parameters.h"
 #include "driver_test.h"
 
-#include <dynamic_reconfigure/Reconfigure.h>
 #include <std_msgs/Bool.h>
 
 #include <chrono>
 #include <limits>
+#include <map>
 #include <string>
 
 namespace view_servo
@@ -20,6 +21,11 @@ namespace test
 template <typename Robot>
 class EveryDriverTest : public DriverTest<Robot>
 {
+protected:
+  std::map<std::string, double> change(const std::map<std::string, double>& wanted) const
+  {
+    return changeParameters(this->ns_ + "/" + Robot::DRIVER, wanted);
+  }
 };
 
 TYPED_TEST_SUITE_P(EveryDriverTest);
@@ -160,16 +166,8 @@ TYPED_TEST_P(EveryDriverTest, KeepsLimitsThatPeopleChangeWhileItDrives)
   constexpr double SLOW = 0.002;  // [m/s, rad/s]
   constexpr std::chrono::milliseconds AT_ONCE(static_cast<int>(100.0 * SLOWDOWN));
   this->drive();
-  const std::string service = this->ns_ + "/" + TypeParam::DRIVER + "/set_parameters";
   const auto set = [&](double most) {
-    dynamic_reconfigure::Reconfigure change;
-    change.request.config.doubles.resize(2);
-    change.request.config.doubles[0].name = "max_speed";
-    change.request.config.doubles[1].name = "max_turn_rate";
-    change.request.config.doubles[0].value = change.request.config.doubles[1].value = most;
-    EXPECT_TRUE(callService(service, change.request, change.response));
-    EXPECT_EQ(change.response.config.doubles.size(), 4U);
-    return change.response.config.doubles.empty() ? 0.0 : change.response.config.doubles[0].value;
+    return this->change({ { "max_speed", most }, { "max_turn_rate", most } })["max_speed"];
   };
   EXPECT_EQ(set(SLOW), SLOW);
   const auto changed = std::chrono::steady_clock::now() + AT_ONCE;
@@ -180,6 +178,36 @@ TYPED_TEST_P(EveryDriverTest, KeepsLimitsThatPeopleChangeWhileItDrives)
   EXPECT_LT(most, 1.0) << "no more than it was started with";
   EXPECT_TRUE(waitUntil([&] { return this->commands_.fastestAfter(changed) > SLOW; })) << this->reason();
   EXPECT_EQ(set(std::numeric_limits<double>::quiet_NaN()), most);
+}
+
+TYPED_TEST_P(EveryDriverTest, TakesGainsThatPeopleChangeWhileItDrives)
+{
+  const std::chrono::milliseconds at_once(static_cast<int>(100.0 * SLOWDOWN));
+  this->drive();
+  const std::map<std::string, double> started = this->change({});
+  std::map<std::string, double> gains;
+  for (const auto& [name, value] : started)
+  {
+    if (name.find("gain") != std::string::npos)
+    {
+      gains[name] = 0.1 * value;
+    }
+  }
+  ASSERT_EQ(gains.size(), 2U);
+  const auto before = std::chrono::steady_clock::now();
+  EXPECT_TRUE(waitUntil([&] { return this->commands_.lastMotionAfter(before) > 0.3; })) << this->reason();
+  const double fast = this->commands_.fastestAfter(before);
+  std::map<std::string, double> live = this->change(gains);
+  for (const auto& [name, gain] : gains)
+  {
+    EXPECT_NEAR(live[name], gain, 1e-9) << name;
+  }
+  const auto changed = std::chrono::steady_clock::now() + 3 * at_once;  // it brakes within its acceleration
+  EXPECT_TRUE(waitUntil([&] { return this->commands_.lastMotionAfter(changed) > 0.3; })) << this->reason();
+  EXPECT_LT(this->commands_.fastestAfter(changed), 0.6 * fast);
+  EXPECT_EQ(this->change(started), started);
+  EXPECT_NEAR(this->change({ { "gain", 1e9 } })["gain"], 2.0 * started.at("gain"), 1e-9);
+  EXPECT_EQ(this->change(started), started);
 }
 
 TYPED_TEST_P(EveryDriverTest, StopsWhenThePeerFallsSilentAndGoesOnWithIt)
@@ -296,10 +324,11 @@ REGISTER_TYPED_TEST_SUITE_P(EveryDriverTest, WaitsForAPeerThatAnswersLate, EndsI
                             EndsItsProcessWhileItPrepares, RefusesAViewThatItsPeerRefuses, RefusesAViewThatIsNotThere,
                             RefusesWhenDisabled, RefusesTimesThatAreNone, StopsWhenDisabled,
                             StopsWhenTheGoalIsCancelled, StopsForAnotherGoal, StopsBeforeItsProcessEnds, GivesUpInTime,
-                            KeepsLimitsThatPeopleChangeWhileItDrives, StopsWhenThePeerFallsSilentAndGoesOnWithIt,
-                            GivesUpWhenThePeerStaysSilent, StopsWhenTimeGoesBack, StopsForStampsThatStandStill,
-                            StopsForStampsThatAreZero, StopsWhenTheCalibrationChanges, StopsWhenNobodyFollowsAnyMore,
-                            StandsWhileItIsHeld, SurvivesWhateverIsInMessages, TakesManyGoalsWhilePeersComeAndGo);
+                            KeepsLimitsThatPeopleChangeWhileItDrives, TakesGainsThatPeopleChangeWhileItDrives,
+                            StopsWhenThePeerFallsSilentAndGoesOnWithIt, GivesUpWhenThePeerStaysSilent,
+                            StopsWhenTimeGoesBack, StopsForStampsThatStandStill, StopsForStampsThatAreZero,
+                            StopsWhenTheCalibrationChanges, StopsWhenNobodyFollowsAnyMore, StandsWhileItIsHeld,
+                            SurvivesWhateverIsInMessages, TakesManyGoalsWhilePeersComeAndGo);
 
 }  // namespace test
 }  // namespace view_servo

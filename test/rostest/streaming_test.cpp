@@ -1,5 +1,6 @@
 // Copyright (c) 2026, the view_servo authors
 // SPDX-License-Identifier: BSD-3-Clause
+#include "change_parameters.h"
 #include "node_test.h"
 #include "store_from_camera.h"
 #include "support/text_file.h"
@@ -23,6 +24,7 @@
 #include <cstddef>
 #include <filesystem>
 #include <functional>
+#include <map>
 #include <optional>
 #include <set>
 #include <string>
@@ -297,6 +299,35 @@ TEST_F(StreamingTest, MatchesTheLatestImageOnRequestUnlessItIsStale)
       [&] { left_.camera.publish(seen_, ros::Time::now() - ros::Duration(10.0)); }))
       << response.message;
   EXPECT_NE(response.message.find("max_image_age"), std::string::npos) << response.message;
+}
+
+TEST_F(StreamingTest, TakesTheRateAndThresholdsThatPeopleChange)
+{
+  constexpr double SLOW = 0.5;  // [Hz]
+  const auto change = [](const std::map<std::string, double>& wanted) {
+    return changeParameters("left/point_matcher", wanted);
+  };
+  const auto nextMatches = [this] {
+    const std::size_t before = left_.matches.messages().size();
+    EXPECT_TRUE(waitUntil([&] { return left_.matches.messages().size() > before + 1; }, [&] { left_.send(seen_); }));
+    return left_.matches.last()->matches.size();
+  };
+  left_.teach("wall", picture_);
+  ASSERT_TRUE(left_.setView("wall").success);
+  const std::map<std::string, double> started = change({});
+  const std::size_t usual = nextMatches();
+  EXPECT_EQ(change({ { "patch_correlation", 1.5 } }), started) << "no correlation is as high";
+  EXPECT_EQ(change({ { "patch_correlation", 0.999 } })["patch_correlation"], 0.999);
+  EXPECT_LT(nextMatches(), usual);
+  EXPECT_EQ(change({ { "patch_correlation", started.at("patch_correlation") }, { "rate", SLOW } })["rate"], SLOW);
+  nextMatches();
+  const std::size_t at = left_.matches.messages().size();
+  ASSERT_TRUE(waitUntil([&] { return left_.matches.messages().size() > at; }, [&] { left_.send(seen_); }));
+  const auto messages = left_.matches.messages();
+  EXPECT_GT((messages[at].header.stamp - messages[at - 1].header.stamp).toSec(), 0.9 / SLOW);
+  EXPECT_EQ(messages[at].matches.size(), usual);
+  EXPECT_EQ(change({ { "rate", 1e9 } })["rate"], 4.0 * started.at("rate"));
+  EXPECT_EQ(change(started), started);
 }
 
 TEST_F(StreamingTest, GoesOnWhenTheViewDisappears)

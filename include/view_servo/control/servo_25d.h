@@ -141,6 +141,9 @@ public:
    */
   void addLoss(double stamp, const std::string& reason);
 
+  /** Sets gain and near_gain of the parameters anew. @throws std::invalid_argument with all faults; nothing is set then. */
+  void setGains(double gain, double near_gain);
+
   /** Tells which twist was sent to the camera. @param time from which on the camera follows it [s]. */
   void sent(double time, const Twist& twist);
 

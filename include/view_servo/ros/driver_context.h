@@ -5,6 +5,7 @@
 #include "view_servo/control/input_watch.h"
 #include "view_servo/ros/control_node.h"
 #include "view_servo/ros/driver_params.h"
+#include "view_servo/ros/live_parameters.h"
 #include "view_servo/ros/node_base.h"
 #include "view_servo/ros/parameters.h"
 
@@ -234,6 +235,15 @@ public:
     return body();
   }
 
+  /**
+   * Adds numbers that people may change while the node runs. For a driver's constructor. @param group its functions are
+   * called without the mutex.
+   */
+  void addLive(LiveGroup group)
+  {
+    live_groups_.push_back(std::move(group));
+  }
+
   /** Adds an input without which the robot does not move. For a driver's constructor; the node owns the input. */
   DriverInput& addInput(const std::string& what, const std::string& topics, double timeout);
 
@@ -280,6 +290,7 @@ protected:
   std::string waiting_for_;                 ///< what the goal that is being prepared waits for, in words
   std::vector<std::unique_ptr<DriverInput>> inputs_;
   std::vector<ros::Subscriber> subscribers_;
+  std::vector<LiveGroup> live_groups_;
 
 private:
   ros::Publisher wanted_view_publisher_;

@@ -159,14 +159,14 @@ private:
     server_.start();
     goal_thread_ = std::thread([this] { prepareGoals(); });
     VelocityLimits limits = params_.limits;
-    live_limits_ = std::make_unique<LiveParameters>(
-        private_nh_,
-        upToNow(parameters(limits), { "max_speed", "max_turn_rate", "max_acceleration", "max_turn_acceleration" },
-                LEAST_LIMIT),
-        [this](const std::vector<LiveNumber>& numbers) {
-          const VelocityLimits live{ numbers[0].value, numbers[1].value, numbers[2].value, numbers[3].value };
-          locked([&] { limiter_.setLimits(live); });
-        });
+    live_groups_.insert(
+        live_groups_.begin(),
+        liveGroup<VelocityLimits>(
+            limits,
+            upToNow(parameters(limits), { "max_speed", "max_turn_rate", "max_acceleration", "max_turn_acceleration" },
+                    LEAST_LIMIT),
+            [this](const VelocityLimits& live) { locked([&] { limiter_.setLimits(live); }); }));
+    live_parameters_ = std::make_unique<LiveParameters>(private_nh_, live_groups_);
     control_timer_ = every(1.0 / params_.node.control_rate, "control",
                            [this] { runLocked("a cycle of control", [this] { cycle(); }); });
   }
@@ -549,7 +549,7 @@ private:
   bool held_ = false;  // by `stop`
   std::thread goal_thread_;
   ros::WallTimer control_timer_;
-  std::unique_ptr<LiveParameters> live_limits_;
+  std::unique_ptr<LiveParameters> live_parameters_;
 };
 
 }  // namespace view_servo

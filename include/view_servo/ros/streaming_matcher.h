@@ -9,6 +9,7 @@
 #include "view_servo/ros/camera_input.h"
 #include "view_servo/ros/conversions.h"
 #include "view_servo/ros/image_source.h"
+#include "view_servo/ros/live_parameters.h"
 #include "view_servo/ros/node_base.h"
 #include "view_servo/ros/parameters.h"
 #include "view_servo/ros/view_choice.h"
@@ -42,6 +43,7 @@
 #include <string>
 #include <thread>
 #include <utility>
+#include <vector>
 
 namespace view_servo
 {
@@ -112,12 +114,18 @@ struct MatchLabel
  * nothing is matched while nobody subscribes. The pace is kept by a steady clock, so that neither a paused nor a
  * looping bag changes it.
  *
+ * `~rate`, and of the parameters of Matching its thresholds, may be changed while the node runs, see LiveParameters:
+ * they count from the next image on. What the features of stored views depend on may not, as all would have to be found
+ * anew.
+ *
  * `Matching` is the way of matching. It has
  *  - `Service`, whose request has reference, query and overlay, whose response success, message, elapsed_ms and
  *    overlay; `Options`, what else a request may ask for, which by default is what camera images get; `Message`, which
  *    is published on `~TOPIC`; the default `RATE` [Hz];
  *  - `Params`, with their table parameters(Params&) and validate(), a constructor that takes those, and
  *    `FeatureParams features() const`;
+ *  - `static std::vector<std::string> thresholds()`: names of parameters of what is accepted as a match, all of them
+ *    "double", on which features() do not depend;
  *  - `Result`, a ViewMatch, which may have more than that;
  *  - `static void clear(Service::Response&)`, which sets what a refused request leaves unknown;
  *  - `static Options options(const Service::Request&)`, which throws when the request makes no sense;
@@ -187,8 +195,8 @@ private:
   StreamingMatcher(const ros::NodeHandle& nh, const ros::NodeHandle& private_nh, const Params& params)
     : NodeBase(nh, private_nh),
       rate_(params.node.rate),
-      matching_(params.matching),
-      features_(matching_.features()),
+      matching_(std::make_shared<const Matching>(params.matching)),
+      features_(matching_->features()),
       camera_(nh, private_nh, params.node.camera, [this](const CameraFrame& frame) { onFrame(frame); }),
       sources_(params.node.sources, camera_),
       views_(sources_.store(), features_),
@@ -209,6 +217,32 @@ private:
     diagnostics_.add("matching", this, &StreamingMatcher::diagnose);
     ROS_INFO_STREAM("stored views are in " << sources_.store().directory());
     worker_ = std::thread([this] { work(); });
+    live_parameters_ = std::make_unique<LiveParameters>(private_nh_, liveNumbers(params));
+  }
+
+  /** The parameters that may be changed while the node runs. */
+  std::vector<LiveGroup> liveNumbers(const Params& params)
+  {
+    StreamingMatcherParams node = params.node;
+    typename Matching::Params matching = params.matching;
+    return {
+      liveGroup<StreamingMatcherParams>(node, aroundNow(parameters(node), { "rate" }, LIVE_RATE),
+                                        [this](const StreamingMatcherParams& live) { rate_ = live.rate; }),
+      liveGroup<typename Matching::Params>(matching,
+                                           aroundNow(parameters(matching), Matching::thresholds(), LIVE_THRESHOLD),
+                                           [this](const typename Matching::Params& live) {
+                                             const auto stricter = std::make_shared<const Matching>(live);
+                                             const std::lock_guard<std::mutex> lock(mutex_);
+                                             matching_ = stricter;
+                                           }),
+    };
+  }
+
+  /** The way of matching by the present thresholds. */
+  std::shared_ptr<const Matching> matching()
+  {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    return matching_;
   }
 
   void match(const typename Service::Request& request, typename Service::Response& response)
@@ -217,7 +251,7 @@ private:
     const typename Matching::Options options = Matching::options(request);
     const MatchedImage reference = prepare(request.reference, "reference");
     const MatchedImage query = prepare(request.query, "query");
-    const typename Matching::Result result = matching_.match(reference, query, options, given_up_);
+    const typename Matching::Result result = matching()->match(reference, query, options, given_up_);
 
     if (request.overlay)
     {
@@ -301,7 +335,6 @@ private:
   void work()
   {
     using Clock = std::chrono::steady_clock;
-    const auto period = std::chrono::duration_cast<Clock::duration>(std::chrono::duration<double>(1.0 / rate_));
     std::unique_lock<std::mutex> lock(mutex_);
     while (!stopping_)
     {
@@ -317,7 +350,8 @@ private:
         continue;
       }
       const std::optional<CameraFrame> frame = std::exchange(newest_, std::nullopt);
-      const Clock::time_point next = Clock::now() + period;
+      const std::chrono::duration<double> period(1.0 / rate_);
+      const Clock::time_point next = Clock::now() + std::chrono::duration_cast<Clock::duration>(period);
       lock.unlock();
       LastResult result;
       const std::string fault =
@@ -366,7 +400,7 @@ private:
       const MatchedImage current{ std::make_shared<const PreparedImage>(grey, cv::Rect(), features_), label.header,
                                   toCamera(*frame.info) };
       const typename Matching::Result result =
-          matching_.match(reference, current, typename Matching::Options(), given_up_);
+          matching()->match(reference, current, typename Matching::Options(), given_up_);
       publish(result, label);
       if (wants_overlay)
       {
@@ -411,9 +445,9 @@ private:
     status.add("Goal", chosen.goal);
   }
 
-  const double rate_;
-  const Matching matching_;
-  const FeatureParams features_;
+  std::atomic<double> rate_;
+  std::shared_ptr<const Matching> matching_;  // guarded by the mutex
+  const FeatureParams features_;              // do not depend on thresholds
 
   std::mutex mutex_;  // guards what follows
   std::condition_variable wake_;
@@ -436,6 +470,7 @@ private:
   ros::ServiceServer match_service_;
   ros::ServiceServer set_view_service_;
   std::thread worker_;
+  std::unique_ptr<LiveParameters> live_parameters_;
 };
 
 }  // namespace view_servo

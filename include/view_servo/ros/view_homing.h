@@ -13,6 +13,7 @@
 #include "view_servo/ros/driver_context.h"
 #include "view_servo/ros/driver_params.h"
 #include "view_servo/ros/homing_worker.h"
+#include "view_servo/ros/live_parameters.h"
 #include "view_servo/ros/marker_output.h"
 #include "view_servo/ros/odometry_input.h"
 #include "view_servo/ros/transform_source.h"
@@ -24,6 +25,7 @@
 #include <diagnostic_updater/DiagnosticStatusWrapper.h>
 #include <std_msgs/Header.h>
 
+#include <atomic>
 #include <chrono>
 #include <functional>
 #include <memory>
@@ -40,6 +42,9 @@ namespace view_servo
  * Subscribes `image_raw`, `camera_info` (see CameraInput), `point_matches` (view_servo/PointMatches), `line_matches`
  * (view_servo/LineMatches), `odom` (nav_msgs/Odometry) and tf; publishes what BaseOutput does, and `~markers`
  * (visualization_msgs/MarkerArray, latched), see markers.h: of each image while somebody subscribes; deleted with the task.
+ *
+ * Of the parameters, `gain` and `turn_gain` may be changed while the node runs, and `distance_tolerance` and
+ * `yaw_tolerance`, which count from the next task on; see LiveParameters.
  *
  * Unless something else is said, members are called with the mutex of the DriverContext held. As its threads call the
  * hooks, it has to be the last member of its owner, so that it is destroyed first.
@@ -149,6 +154,8 @@ public:
 private:
   using Clock = std::chrono::steady_clock;
 
+  /** The parameters that may be changed while the node runs. */
+  LiveGroup liveNumbers();
   std::string odometryLacks() const;
   void needMatches(bool needed);
   void endIfTimeWentBack(const DriverInput& input);
@@ -186,6 +193,12 @@ private:
   bool matches_needed_ = true;                   // because the view's points are not tracked
   bool does_without_matches_ = false;            // see setDoesWithoutMatches()
   std::optional<Clock::time_point> unanswered_;  // when an image came that was worked on, until a command follows
+
+  // What people have changed while the node runs.
+  std::atomic<double> gain_share_{ 1.0 };       // of the gain that the node was started with
+  std::atomic<double> turn_gain_share_{ 1.0 };  // of the turn gain
+  std::atomic<double> distance_tolerance_;      // of tasks that are made from now on [m]
+  std::atomic<double> yaw_tolerance_;           // [rad]
 
   HomingWorker worker_;
   CameraInput camera_;
