@@ -46,7 +46,7 @@ struct LiveSpan
 constexpr LiveSpan LIVE_GAIN{ 0.1, 2.0 };
 constexpr LiveSpan LIVE_TOLERANCE{ 0.1, 10.0 };
 constexpr LiveSpan LIVE_THRESHOLD{ 0.5, 4.0 };  // of what is accepted: lower ones let false answers pass
-constexpr LiveSpan LIVE_RATE{ 0.1, 4.0 };
+constexpr LiveSpan LIVE_RATE{ 0.01, 4.0 };
 
 /** The same, but each number is allowed within a span of the value that it has now. */
 std::vector<LiveNumber> aroundNow(const std::vector<Parameter>& table, const std::vector<std::string>& names,
