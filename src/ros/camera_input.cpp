@@ -22,6 +22,11 @@ namespace
 constexpr double CHECK_PERIOD = 5.0;   // [s]
 constexpr double ERROR_PERIOD = 10.0;  // [s]
 
+double steadySeconds()
+{
+  return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count();
+}
+
 }  // namespace
 
 std::vector<Parameter> parameters(CameraInputParams& params)
@@ -41,6 +46,7 @@ CameraInput::CameraInput(const ros::NodeHandle& nh, const ros::NodeHandle& priva
   : params_(params),
     on_frame_(std::move(on_frame)),
     on_problem_(std::move(on_problem)),
+    pairing_(params.queue_size),
     last_diagnosis_(ros::WallTime::now()),
     synchronizer_(static_cast<std::uint32_t>(params.queue_size))
 {
@@ -48,12 +54,9 @@ CameraInput::CameraInput(const ros::NodeHandle& nh, const ros::NodeHandle& priva
   ros::NodeHandle topics_nh(nh);
   synchronizer_.connectInput(image_subscriber_, info_subscriber_);
   synchronizer_.registerCallback(&CameraInput::frameCallback, this);
-  image_subscriber_.registerCallback([this](const CameraImageConstPtr&) { onImage(); });
-  info_subscriber_.registerCallback([this](const sensor_msgs::CameraInfoConstPtr&) {
-    const std::lock_guard<std::mutex> lock(mutex_);
-    ++infos_;
-    unpaired_ = 0;
-  });
+  image_subscriber_.registerCallback([this](const CameraImageConstPtr& image) { onImage(image->header.stamp); });
+  info_subscriber_.registerCallback(
+      [this](const sensor_msgs::CameraInfoConstPtr& info) { onInfo(info->header.stamp); });
   image_subscriber_.subscribe(nh, private_nh, "image_raw", params.image_transport, params.queue_size);
   info_subscriber_.subscribe(topics_nh, "camera_info", queue_size);
   check_timer_ =
@@ -72,29 +75,31 @@ std::string CameraInput::problem() const
   return problem_;
 }
 
-void CameraInput::onImage()
+void CameraInput::onImage(const ros::Time& stamp)
 {
-  // A calibration may come after its image. What waits while a frame is worked on comes all at once, and images first.
-  constexpr int OFTEN = 5;
-  constexpr std::chrono::milliseconds LONG(150);
-  const auto now = std::chrono::steady_clock::now();
   std::string problem;
   {
     const std::lock_guard<std::mutex> lock(mutex_);
     ++images_;
-    if (++unpaired_ == 1)
-    {
-      unpaired_since_ = now;
-    }
-    if (unpaired_ < OFTEN || now - unpaired_since_ < LONG)
-    {
-      return;
-    }
-    CameraTraffic traffic;
-    traffic.images = unpaired_;
-    problem_ = problem = faultOf(traffic, topics());
+    problem = noteUnpaired(pairing_.addImage(steadySeconds(), stamp));
   }
   reportProblem(problem);
+}
+
+void CameraInput::onInfo(const ros::Time& stamp)
+{
+  std::string problem;
+  {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    ++infos_;
+    problem = noteUnpaired(pairing_.addInfo(steadySeconds(), stamp));
+  }
+  reportProblem(problem);
+}
+
+std::string CameraInput::noteUnpaired(const std::optional<CameraTraffic>& traffic)
+{
+  return traffic ? problem_ = faultOf(*traffic, topics()) : "";
 }
 
 CameraFrame CameraInput::latest() const
@@ -180,6 +185,7 @@ void CameraInput::onPair(const CameraImageConstPtr& image, const sensor_msgs::Ca
     {
       const std::lock_guard<std::mutex> lock(mutex_);
       ++pairs_;
+      pairing_.addPair();
       problem_ = image->fault;
     }
     reportProblem(image->fault + "; it is left out");
@@ -189,6 +195,7 @@ void CameraInput::onPair(const CameraImageConstPtr& image, const sensor_msgs::Ca
   {
     const std::lock_guard<std::mutex> lock(mutex_);
     ++pairs_;
+    pairing_.addPair();
     fault_ = problem_ = fault;
     latest_ = fault.empty() ? CameraFrame{ image, info } : CameraFrame{};
     frames_ += fault.empty() ? 1 : 0;
@@ -213,7 +220,8 @@ void CameraInput::checkInputs()
   {
     const std::lock_guard<std::mutex> lock(mutex_);
     // Images alone are told of by onImage(), as a calibration may come after its image.
-    problem = infos_ > 0 ? faultOf(CameraTraffic{ images_, infos_, pairs_, CHECK_PERIOD }, topics()) : "";
+    const CameraTraffic traffic{ images_, infos_, pairs_, CHECK_PERIOD, pairing_.imagesAhead() };
+    problem = infos_ > 0 ? faultOf(traffic, topics()) : "";
     problem_ = problem.empty() ? problem_ : problem;
     images_ = infos_ = pairs_ = 0;
   }

@@ -7,6 +7,8 @@
 #include <ros/time.h>
 #include <sensor_msgs/CameraInfo.h>
 
+#include <limits>
+#include <optional>
 #include <string>
 
 namespace view_servo
@@ -35,10 +37,49 @@ struct CameraTraffic
   int infos = 0;          ///< messages on the topic of camera_info
   int pairs = 0;          ///< pairs of an image and a camera_info with the same stamp
   double duration = 0.0;  ///< length of the time in which they came [s]
+  /** By how much the newest image is stamped after the newest camera_info [s]; NaN: unknown. */
+  double images_ahead = std::numeric_limits<double>::quiet_NaN();
 };
 
 /** What is wrong with the numbers of messages that came; nothing when none came at all. */
 std::string faultOf(const CameraTraffic& traffic, const CameraTopics& topics);
+
+/**
+ * Finds out early that images come without camera_info, or that both come and never have the same stamp. The latter is
+ * certain once more have come of both than wait for each other: one kind may come later than the other all the time.
+ * Where there were pairs before, a few suffice. Times are of a steady clock [s].
+ */
+class PairingWatch
+{
+public:
+  /** @param queue_size how many messages of each kind wait for one of the other kind. */
+  explicit PairingWatch(int queue_size) : queue_size_(queue_size)
+  {
+  }
+
+  /** @return what came, when the image shows that no pairs come; else empty. */
+  std::optional<CameraTraffic> addImage(double time, const ros::Time& stamp);
+  /** The same for a camera_info. */
+  std::optional<CameraTraffic> addInfo(double time, const ros::Time& stamp);
+  /** An image and a camera_info had the same stamp. */
+  void addPair();
+
+  /** As CameraTraffic::images_ahead. */
+  double imagesAhead() const;
+
+private:
+  std::optional<CameraTraffic> unpaired(double time) const;
+
+  int queue_size_;
+  bool paired_before_ = false;
+  int images_ = 0;            // since the last pair
+  int infos_ = 0;             // since the last pair
+  double both_since_ = 0.0;   // when the first message came after which both kinds had come since the last pair
+  int images_alone_ = 0;      // since the last camera_info
+  double alone_since_ = 0.0;  // when the first of them came
+  ros::Time image_stamp_;     // of the newest
+  ros::Time info_stamp_;
+};
 
 /** What is wrong with an image and the camera_info of the same stamp: with calibration or sizes. */
 std::string faultOf(const CameraImage& image, const sensor_msgs::CameraInfo& info, const CameraTopics& topics);

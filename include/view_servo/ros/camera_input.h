@@ -13,9 +13,9 @@
 #include <ros/wall_timer.h>
 #include <sensor_msgs/CameraInfo.h>
 
-#include <chrono>
 #include <functional>
 #include <mutex>
+#include <optional>
 #include <string>
 
 namespace view_servo
@@ -95,7 +95,10 @@ public:
 
 private:
   void frameCallback(const CameraImageConstPtr& image, const sensor_msgs::CameraInfoConstPtr& info);
-  void onImage();
+  void onImage(const ros::Time& stamp);
+  void onInfo(const ros::Time& stamp);
+  /** Remembers that no pairs come, if so. @return what to report. The mutex is held. */
+  std::string noteUnpaired(const std::optional<CameraTraffic>& traffic);
   /** Logs a problem and hands it on; nothing when it is empty. The mutex is not held. */
   void reportProblem(const std::string& problem) const;
   void onPair(const CameraImageConstPtr& image, const sensor_msgs::CameraInfoConstPtr& info);
@@ -108,15 +111,14 @@ private:
   mutable std::mutex waiting_mutex_;  // held by the one who waits; taken before mutex_
   mutable std::mutex mutex_;          // guards what follows, up to the transport
   CameraFrame latest_;
-  std::string fault_;                                     // of the last pair
-  std::string problem_;                                   // why the last frame was not usable, or none came
-  int unpaired_ = 0;                                      // images since the last camera_info
-  std::chrono::steady_clock::time_point unpaired_since_;  // when the first of them came
-  int images_ = 0;                                        // images that have come since the last check
-  int infos_ = 0;                                         // messages on camera_info that have come since the last check
-  int pairs_ = 0;                                         // images and camera_info with one stamp, since the last check
-  double rate_ = 0.0;                                     // of usable frames [Hz]
-  int frames_ = 0;                                        // usable, since the last diagnosis
+  std::string fault_;    // of the last pair
+  std::string problem_;  // why the last frame was not usable, or none came
+  PairingWatch pairing_;
+  int images_ = 0;     // images that have come since the last check
+  int infos_ = 0;      // messages on camera_info that have come since the last check
+  int pairs_ = 0;      // images and camera_info with one stamp, since the last check
+  double rate_ = 0.0;  // of usable frames [Hz]
+  int frames_ = 0;     // usable, since the last diagnosis
   ros::WallTime last_diagnosis_;
 
   CameraImageSubscriber image_subscriber_;
