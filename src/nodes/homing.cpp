@@ -1,5 +1,6 @@
 // Copyright (c) 2026, the view_servo authors
 // SPDX-License-Identifier: BSD-3-Clause
+#include "nodes/base_driver.h"
 #include "nodes/nodes.h"
 
 #include "view_servo/HomeToViewAction.h"
@@ -58,29 +59,29 @@ struct HomingStages
  *  - `learn_view` (view_servo/WantedView): the view to learn while somebody drives the base away from it.
  *
  * Publishes, besides what every driver does (see DriverNode):
- *  - `cmd_vel` (geometry_msgs/Twist, in base_link) and `cmd_vel_stamped`, or `cmd_vel_dry` and `cmd_vel_dry_stamped`; zero
- *    for a while after each end, then nothing;
+ *  - `cmd_vel` (geometry_msgs/Twist, in base_link) and `cmd_vel_stamped`, or `cmd_vel_dry` and `cmd_vel_dry_stamped`;
+ *    zero for a while after each end, then nothing;
  *  - `heading` (view_servo/Heading): for each image; `heading_arrow` (geometry_msgs/PoseStamped): the same for rviz, at
- *    the base, its x axis towards the view, while there is a heading. `view_pose` (geometry_msgs/PoseWithCovarianceStamped);
+ *    the base, its x axis towards the view, while there is a heading. `view_pose`
+ *    (geometry_msgs/PoseWithCovarianceStamped);
  *  - `~markers` (visualization_msgs/MarkerArray): see ViewHoming.
- * Action: `home` (view_servo/HomeToView). All views of a goal are read before anything moves. Between two of them the base
- * stands until a matcher has found the next one.
+ * Action: `home` (view_servo/HomeToView). All views of a goal are read before anything moves. Between two of them the
+ * base stands until a matcher has found the next one.
  *
- * A thread of the driver's own works on images and matches, and leaves a Course; every cycle of control follows it by the
- * newest odometry, also while an image is worked on.
+ * A thread of the driver's own works on images and matches, and leaves a Course; every cycle of control follows it by
+ * the newest odometry, also while an image is worked on.
  */
-class HomingDriver
+class HomingDriver : public BaseDriver
 {
 public:
   using Action = HomeToViewAction;
-  using Velocity = BaseVelocity;
-  using Limiter = BaseVelocityLimiter;
   using Task = HomingStages;
   using Params = HomingDriverParams;
   static constexpr const char* ACTION = "home";
 
   HomingDriver(DriverContext& context, const Params& params)
-    : context_(context),
+    : BaseDriver(homing_),
+      context_(context),
       params_(params),
       idle_view_(params.view),
       homing_(context, params_,
@@ -161,32 +162,10 @@ public:
   {
     return homing_.velocity();
   }
-  void sent(double time, const Velocity& velocity)
-  {
-    homing_.sent(time, velocity);
-  }
-  static void onMissingInput(double /*time*/, const std::string& /*why*/)
-  {
-  }
-  bool hasListener() const
-  {
-    return homing_.hasListener();
-  }
-  void publish(const Velocity& velocity) const
-  {
-    homing_.publish(velocity);
-  }
-  std::optional<double> takeLatency()
-  {
-    return homing_.takeLatency();
-  }
 
   // ----------------------------------------------------------------------------------------------------- messages
 
-  void fill(ServoStatus& status) const
-  {
-    homing_.fill(status);
-  }
+  using BaseDriver::fill;
 
   void fill(HomeToViewResult& result) const
   {
@@ -205,11 +184,6 @@ public:
     feedback.view = stages_->tasks[stages_->at]->view;
     feedback.number = static_cast<int>(stages_->at) + 1;
     feedback.count = static_cast<int>(stages_->tasks.size());
-  }
-
-  void diagnose(diagnostic_updater::DiagnosticStatusWrapper& status) const
-  {
-    homing_.diagnose(status);
   }
 
 private:

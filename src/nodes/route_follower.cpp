@@ -1,5 +1,6 @@
 // Copyright (c) 2026, the view_servo authors
 // SPDX-License-Identifier: BSD-3-Clause
+#include "nodes/base_driver.h"
 #include "nodes/nodes.h"
 
 #include "view_servo/FollowRouteAction.h"
@@ -45,18 +46,17 @@ struct RouteTask
  * It homes to one view after another, and goes on when it is near enough to one that is not the last (see RouteGuide).
  * What homing to the next view needs is read from disk by a thread of its own, while the base drives to the one before.
  */
-class RouteDriver
+class RouteDriver : public BaseDriver
 {
 public:
   using Action = FollowRouteAction;
-  using Velocity = BaseVelocity;
-  using Limiter = BaseVelocityLimiter;
   using Task = RouteTask;
   using Params = RouteFollowerParams;
   static constexpr const char* ACTION = "follow";
 
   RouteDriver(DriverContext& context, const Params& params)
-    : context_(context),
+    : BaseDriver(homing_),
+      context_(context),
       params_(params),
       routes_(viewsDir(params.views_dir)),
       worker_("reading the next view of a route", [this](Order&& order) { load(order); }),
@@ -154,32 +154,10 @@ public:
     const std::optional<Course> blind = blindCourse();
     return blind ? homing_.follow(*blind) : homing_.velocity();
   }
-  void sent(double time, const Velocity& velocity)
-  {
-    homing_.sent(time, velocity);
-  }
-  static void onMissingInput(double /*time*/, const std::string& /*why*/)
-  {
-  }
-  bool hasListener() const
-  {
-    return homing_.hasListener();
-  }
-  void publish(const Velocity& velocity) const
-  {
-    homing_.publish(velocity);
-  }
-  std::optional<double> takeLatency()
-  {
-    return homing_.takeLatency();
-  }
 
   // ----------------------------------------------------------------------------------------------------- messages
 
-  void fill(ServoStatus& status) const
-  {
-    homing_.fill(status);
-  }
+  using BaseDriver::fill;
 
   void fill(FollowRouteResult& result) const
   {
@@ -194,11 +172,6 @@ public:
         homing_.base() ? guide_->deviation(*homing_.base()) : RouteGuide::Deviation();
     feedback.sideways = deviation.sideways;
     feedback.yaw = deviation.yaw;
-  }
-
-  void diagnose(diagnostic_updater::DiagnosticStatusWrapper& status) const
-  {
-    homing_.diagnose(status);
   }
 
 private:
@@ -227,8 +200,8 @@ private:
   }
 
   /**
-   * Drops the stops before the one that a recognizer sees. Nothing happens when there is no recognizer, or it sees none of
-   * them within a few seconds. By a topic, as drivers call no services. Waits, without the mutex.
+   * Drops the stops before the one that a recognizer sees. Nothing happens when there is no recognizer, or it sees none
+   * of them within a few seconds. By a topic, as drivers call no services. Waits, without the mutex.
    */
   void beginWhereTheBaseIs(std::vector<RouteStop>& stops) const
   {
@@ -267,7 +240,9 @@ private:
     }
   }
 
-  /** A base that cannot slide stands until the next view is found: what it would have to do is not known without one. */
+  /**
+   * A base that cannot slide stands until the next view is found: what it would have to do is not known without one.
+   */
   std::optional<Course> blindCourse() const
   {
     return guide_ && params_.homing.approach.base == BaseKind::HOLONOMIC ? guide_->blindCourse() : std::nullopt;
@@ -368,8 +343,8 @@ private:
   }
 
   /**
-   * Listens to a recognizer, if there is one, while the view has not been found for a while. By homing's thread, as it may
-   * take a while.
+   * Listens to a recognizer, if there is one, while the view has not been found for a while. By homing's thread, as it
+   * may take a while.
    */
   void listenToRecognizer()
   {
