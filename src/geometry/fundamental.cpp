@@ -3,6 +3,7 @@
 #include "view_servo/geometry/fundamental.h"
 
 #include "levenberg_marquardt.h"
+#include "linear_estimate.h"
 #include "normalization.h"
 #include "residuals.h"
 
@@ -289,33 +290,18 @@ std::vector<Eigen::Matrix3d> fundamentalFromSevenPoints(const Correspondences& s
 
 std::optional<Eigen::Matrix3d> fundamentalFromPoints(const Correspondences& pairs)
 {
-  // On eigenvalues of A^T A, that is squared singular values, relative to the largest.
-  constexpr double RANK_TOLERANCE = 1e-12;
-  if (pairs.size() < 8)
-  {
-    return std::nullopt;
-  }
-  const auto normalization = isotropicNormalization(pairs);
-  if (!normalization)
-  {
-    return std::nullopt;
-  }
-  Matrix9d ata = Matrix9d::Zero();
-  for (const Correspondence& pair : pairs)
-  {
-    const auto normalized = (*normalization)(pair);
-    const Eigen::Vector3d reference = normalized.reference.homogeneous();
-    const Eigen::Vector3d current = normalized.current.homogeneous();
+  const auto solution = solveLinearly(pairs, 8, [](const Correspondence& pair, Matrix9d& ata) {
+    const Eigen::Vector3d reference = pair.reference.homogeneous();
+    const Eigen::Vector3d current = pair.current.homogeneous();
     addKronecker(current * current.transpose(), reference * reference.transpose(), ata);
-  }
-  const SymmetricEigen eigen = symmetricEigen(ata);
-  if (!(eigen.values(1) > RANK_TOLERANCE * eigen.values(8)))
+  });
+  if (!solution)
   {
     return std::nullopt;
   }
-  Svd3 svd = singularValues(matrixFromRows(eigen.vectors.col(0)));
+  Svd3 svd = singularValues(solution->matrix);
   svd.values.z() = 0.0;
-  return denormalized(svd.u * svd.values.asDiagonal() * svd.v.transpose(), *normalization);
+  return denormalized(svd.u * svd.values.asDiagonal() * svd.v.transpose(), solution->normalization);
 }
 
 Eigen::Matrix3d refineFundamental(const Eigen::Matrix3d& initial, const Correspondences& pairs, double huber_width,

@@ -3,6 +3,7 @@
 #include "view_servo/geometry/homography.h"
 
 #include "levenberg_marquardt.h"
+#include "linear_estimate.h"
 #include "normalization.h"
 #include "residuals.h"
 
@@ -152,39 +153,22 @@ bool isHomographySample(const Correspondences& four, double min_height)
 
 std::optional<Eigen::Matrix3d> homographyFromPoints(const Correspondences& pairs)
 {
-  // On eigenvalues of A^T A, that is squared singular values, relative to the largest.
-  constexpr double RANK_TOLERANCE = 1e-12;
-  if (pairs.size() < 4)
-  {
-    return std::nullopt;
-  }
-  const auto normalization = isotropicNormalization(pairs);
-  if (!normalization)
-  {
-    return std::nullopt;
-  }
-  // The rows (x^T, 0, -u' x^T) and (0, x^T, -v' x^T) of a pair add M (x) x x^T to A^T A.
-  Matrix9d ata = Matrix9d::Zero();
-  for (const Correspondence& pair : pairs)
-  {
-    const auto [reference, current] = (*normalization)(pair);
+  constexpr double SINGULAR = 1e-12;  // the determinant of a matrix whose squared entries add up to 1
+  const auto solution = solveLinearly(pairs, 4, [](const Correspondence& pair, Matrix9d& ata) {
+    // The rows (x^T, 0, -u' x^T) and (0, x^T, -v' x^T) of a pair add M (x) x x^T to A^T A.
+    const auto& [reference, current] = pair;
     Eigen::Matrix3d m;
     m << 1.0, 0.0, -current.x(), 0.0, 1.0, -current.y(), -current.x(), -current.y(), current.squaredNorm();
     const Eigen::Vector3d x = reference.homogeneous();
     addKronecker(m, x * x.transpose(), ata);
-  }
-  const SymmetricEigen eigen = symmetricEigen(ata);
-  if (!(eigen.values(1) > RANK_TOLERANCE * eigen.values(8)))
+  });
+  if (!solution || !(std::abs(solution->matrix.determinant()) > SINGULAR))
   {
     return std::nullopt;
   }
-  const Eigen::Matrix3d normalized = matrixFromRows(eigen.vectors.col(0));
-  if (!(std::abs(normalized.determinant()) > RANK_TOLERANCE))
-  {
-    return std::nullopt;
-  }
+  const auto& [normalized, normalization] = *solution;
   Eigen::Matrix3d h =
-      (normalization->current.inverseMatrix() * normalized * normalization->reference.matrix()).normalized();
+      (normalization.current.inverseMatrix() * normalized * normalization.reference.matrix()).normalized();
   if (thirdCoordinate(h, pairs.front().reference) < 0.0)
   {
     h = -h;

@@ -314,30 +314,47 @@ TEST(SequentialTest, FailsNothingWithoutABest)
 
 // ---- local optimisation and the improvement stage
 
+/**
+ * Searches ten scenes twice, the second time with other parameters; the same samples are drawn.
+ * @param change void(RansacParams&). @param check void(const Result& before, const Result& after).
+ * @return the sum of the costs after the change, divided by that before.
+ */
+template <typename Estimator, typename Change, typename Check>
+double costRatio(bool planar, int wrong, int iterations, const Change& change, const Check& check)
+{
+  double before_cost = 0.0;
+  double after_cost = 0.0;
+  for (std::uint64_t seed = 0; seed < 10; ++seed)
+  {
+    const test::Scene scene = makeScene(planar, 100, wrong, 1.0, seed);
+    const Estimator estimator(scene.pairs);
+    RansacParams params = uniformParams();
+    params.min_iterations = params.max_iterations = iterations;
+    params.local_optimizations = 0;
+    Rng rng(seed);
+    const auto before = ransac(estimator, params, rng);
+    change(params);
+    Rng same_rng(seed);
+    const auto after = ransac(estimator, params, same_rng);
+    EXPECT_LE(after.cost, before.cost);
+    check(before, after);
+    before_cost += before.cost;
+    after_cost += after.cost;
+  }
+  return after_cost / before_cost;
+}
+
 template <typename Estimator>
 void expectLocalOptimizationImproves(bool planar)
 {
-  double plain_cost = 0.0;
-  double optimized_cost = 0.0;
-  for (std::uint64_t seed = 0; seed < 10; ++seed)
-  {
-    const test::Scene scene = makeScene(planar, 100, 100, 1.0, seed);
-    const Estimator estimator(scene.pairs);
-    RansacParams params = uniformParams();
-    params.min_iterations = params.max_iterations = 300;
-    params.local_optimizations = 0;
-    Rng plain_rng(seed);
-    const auto plain = ransac(estimator, params, plain_rng);
-    params.local_optimizations = 10;
-    Rng optimized_rng(seed);
-    const auto optimized = ransac(estimator, params, optimized_rng);
+  const auto check = [](const auto& plain, const auto& optimized) {
     EXPECT_EQ(plain.statistics.local_optimizations, 0);
     EXPECT_GT(optimized.statistics.local_optimizations, 0);
-    EXPECT_LE(optimized.cost, plain.cost);  // the same samples were drawn
-    plain_cost += plain.cost;
-    optimized_cost += optimized.cost;
-  }
-  EXPECT_LT(optimized_cost, 0.97 * plain_cost);
+  };
+  const auto change = [](RansacParams& params) {
+    params.local_optimizations = 10;
+  };
+  EXPECT_LT(costRatio<Estimator>(planar, 100, 300, change, check), 0.97);
 }
 
 TEST(Ransac, LocalOptimizationImprovesHomographies)
@@ -372,27 +389,14 @@ TEST(Ransac, LocalOptimizationSavesSamples)
 
 TEST(Ransac, ImprovementStageImproves)
 {
-  double plain_cost = 0.0;
-  double improved_cost = 0.0;
-  for (std::uint64_t seed = 0; seed < 10; ++seed)
-  {
-    const test::Scene scene = makeScene(false, 100, 50, 1.0, seed);
-    const FundamentalEstimator estimator(scene.pairs);
-    RansacParams params = uniformParams();
-    params.min_iterations = params.max_iterations = 100;
-    params.local_optimizations = 0;
-    Rng plain_rng(seed);
-    const auto plain = ransac(estimator, params, plain_rng);
-    params.improvement_stage = true;
-    Rng improved_rng(seed);
-    const auto improved = ransac(estimator, params, improved_rng);
-    EXPECT_LE(improved.cost, plain.cost);
+  const auto check = [](const auto& plain, const auto& improved) {
     EXPECT_EQ(improved.statistics.iterations, plain.statistics.iterations);
     EXPECT_GT(improved.statistics.models, plain.statistics.models + 7 * 143);
-    plain_cost += plain.cost;
-    improved_cost += improved.cost;
-  }
-  EXPECT_LT(improved_cost, 0.95 * plain_cost);
+  };
+  const auto change = [](RansacParams& params) {
+    params.improvement_stage = true;
+  };
+  EXPECT_LT(costRatio<FundamentalEstimator>(false, 50, 100, change, check), 0.95);
 }
 
 TEST(Ransac, ImprovementStageReplacesOneDatumAtATime)

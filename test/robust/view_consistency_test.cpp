@@ -204,6 +204,17 @@ TEST(ViewConsistentCandidates, KeepsAllWhenThereIsNothingToSplit)
   EXPECT_EQ(viewConsistentCandidates(coincident, params, rng).size(), 12U);
 }
 
+/** A generator after as many groups of five were drawn from `candidates`. */
+Rng afterDraws(int groups, int candidates, Rng rng)
+{
+  std::vector<int> group;
+  for (int i = 0; i < groups; ++i)
+  {
+    detail::drawDistinct(rng, candidates, 5, group);
+  }
+  return rng;
+}
+
 TEST(ViewConsistentCandidates, DrawsNoMoreGroupsThanAllowed)
 {
   // Coincident candidates are never consistent: only the limit ends the drawing, after exactly that many draws.
@@ -211,14 +222,8 @@ TEST(ViewConsistentCandidates, DrawsNoMoreGroupsThanAllowed)
   ViewConsistencyParams params;
   params.max_groups = 37;
   Rng rng(7);
-  Rng expected(7);
   viewConsistentCandidates(coincident, params, rng);
-  std::vector<int> group;
-  for (int i = 0; i < 37; ++i)
-  {
-    detail::drawDistinct(expected, 12, 5, group);
-  }
-  EXPECT_EQ(rng, expected);
+  EXPECT_EQ(rng, afterDraws(37, 12, Rng(7)));
 }
 
 TEST(ViewConsistentCandidates, StopsWhenCountedOftenEnough)
@@ -229,14 +234,8 @@ TEST(ViewConsistentCandidates, StopsWhenCountedOftenEnough)
   ViewConsistencyParams params;
   params.mean_increments = 3.0;
   Rng rng(8);
-  Rng expected(8);
   viewConsistentCandidates(pairs, params, rng);
-  std::vector<int> group;
-  for (int i = 0; i < 12; ++i)
-  {
-    detail::drawDistinct(expected, 20, 5, group);
-  }
-  EXPECT_EQ(rng, expected);
+  EXPECT_EQ(rng, afterDraws(12, 20, Rng(8)));
 }
 
 }  // namespace
