@@ -1,7 +1,10 @@
 // Copyright (c) 2026, the view_servo authors
 // SPDX-License-Identifier: BSD-3-Clause
 #include "view_servo/geometry/camera.h"
+
+#include "view_servo/images/image_io.h"
 #include "view_servo/parameters/numbers.h"
+#include "view_servo/parameters/shown_text.h"
 
 #include <Eigen/Geometry>
 #include <Eigen/LU>
@@ -45,7 +48,7 @@ std::string faultOfDistortion(const Camera& camera)
   const std::string& model = camera.distortion_model;
   const std::size_t count = camera.distortion.size();
   const auto wrong = [&](const std::string& right) {
-    return "D has " + std::to_string(count) + " coefficients, distortion_model '" + model + "' has " + right;
+    return "D has " + std::to_string(count) + " coefficients, distortion_model '" + shown(model) + "' has " + right;
   };
   if (!std::all_of(camera.distortion.begin(), camera.distortion.end(),
                    [](double number) { return std::isfinite(number); }))
@@ -71,7 +74,7 @@ std::string faultOfDistortion(const Camera& camera)
   {
     return isZero(camera.distortion) ? "" : "D is not zero, but distortion_model is '" + model + "'";
   }
-  return "distortion_model '" + model + "' is not known: plumb_bob, rational_polynomial and equidistant are";
+  return "distortion_model '" + shown(model) + "' is not known: plumb_bob, rational_polynomial and equidistant are";
 }
 
 void requireDistortion(const Camera& camera)
@@ -132,6 +135,11 @@ std::string Camera::fault() const
   if (width <= 0 || height <= 0)
   {
     return "width and height have to be positive";
+  }
+  if (width > MAX_IMAGE_PIXELS / height)  // maps that remove distortion have as many points
+  {
+    return "images of " + std::to_string(width) + " x " + std::to_string(height) + " pixels are too large: over " +
+           std::to_string(MAX_IMAGE_PIXELS / 1'000'000) + " million";
   }
   if (!projection.leftCols<3>().isZero(0.0) && !(projection(0, 0) > 0.0 && projection(1, 1) > 0.0))
   {

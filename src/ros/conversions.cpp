@@ -3,7 +3,9 @@
 #include "view_servo/ros/conversions.h"
 
 #include "view_servo/images/image_io.h"
+#include "view_servo/parameters/error_text.h"
 #include "view_servo/parameters/numbers.h"
+#include "view_servo/parameters/shown_text.h"
 
 #include <cv_bridge/cv_bridge.h>
 #include <sensor_msgs/image_encodings.h>
@@ -14,6 +16,7 @@
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
+#include <limits>
 
 namespace view_servo
 {
@@ -53,8 +56,7 @@ template <typename Result>
 Result readCompressed(const sensor_msgs::CompressedImage& image, const std::string& name,
                       Result (*read)(const std::string&, const std::string&))
 {
-  const std::string said =
-      " (format '" + image.format.substr(0, 80) + "', " + std::to_string(image.data.size()) + " bytes)";
+  const std::string said = " (format '" + shown(image.format) + "', " + std::to_string(image.data.size()) + " bytes)";
   if (image.format.find("compressedDepth") != std::string::npos)
   {
     throw ImageError("'" + name + "' is a depth image, which shows no intensities" + said);
@@ -100,8 +102,9 @@ Camera toCamera(const sensor_msgs::CameraInfo& info)
     to_image(1, 2) = -(info.roi.y_offset / bin_y);
   }
   Camera camera;
-  camera.width = static_cast<int>(width / bin_x);
-  camera.height = static_cast<int>(height / bin_y);
+  constexpr double LARGEST = std::numeric_limits<int>::max();  // which no camera has, so that a fault is found
+  camera.width = static_cast<int>(std::min(width / bin_x, LARGEST));
+  camera.height = static_cast<int>(std::min(height / bin_y, LARGEST));
   camera.distortion_model = info.distortion_model;
   camera.distortion = info.D;
   camera.k = to_image * Eigen::Map<const Eigen::Matrix<double, 3, 3, Eigen::RowMajor>>(info.K.data());
@@ -145,7 +148,7 @@ cv::Mat toGrey(const sensor_msgs::Image& image, const std::string& name)
   }
   catch (const cv_bridge::Exception& error)
   {
-    throw ImageError("'" + name + "': encoding '" + image.encoding + "': " + error.what());
+    throw ImageError("'" + name + "': encoding '" + shown(image.encoding) + "': " + oneLine(error));
   }
 }
 
@@ -168,7 +171,7 @@ cv::Mat toGrey(const sensor_msgs::CompressedImage& image, const std::string& nam
   }
   catch (const cv_bridge::Exception& error)
   {
-    throw ImageError("'" + name + "': format '" + image.format + "': " + error.what());
+    throw ImageError("'" + name + "': format '" + shown(image.format) + "': " + oneLine(error));
   }
 }
 

@@ -2,6 +2,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "view_servo/ros/odometry_input.h"
 
+#include "view_servo/parameters/shown_text.h"
 #include "view_servo/ros/base_conversions.h"
 #include "view_servo/ros/conversions.h"
 #include "view_servo/ros/node_base.h"
@@ -47,7 +48,7 @@ std::string OdometryReader::faultOf(const nav_msgs::Odometry& message, const Pla
   const std::string missing = transforms_.missing(child, base_frame_, ros::Time(0));
   if (!missing.empty())
   {
-    return name + " is of '" + child + "', ~base_frame is '" + base_frame_ + "': " + missing;
+    return name + " is of '" + shown(child) + "', ~base_frame is '" + base_frame_ + "': " + missing;
   }
   base_in_child_ = toPlanar(toIsometry(transforms_.lookUp(child, base_frame_, ros::Time(0), 0.0).transform));
   return "";

@@ -3,6 +3,7 @@
 #include "view_servo/ros/transform_source.h"
 
 #include "view_servo/parameters/error_text.h"
+#include "view_servo/parameters/shown_text.h"
 #include "view_servo/ros/node_base.h"
 #include "view_servo/ros/readiness.h"
 
@@ -39,7 +40,8 @@ std::string TransformSource::missing(const std::string& target, const std::strin
   {
     error = oneLine(exception);
   }
-  return "tf does not know the frame '" + source + "' in '" + target + "'" + (error.empty() ? "" : ": " + error);
+  return "tf does not know the frame '" + shown(source) + "' in '" + shown(target) + "'" +
+         (error.empty() ? "" : ": " + oneLine(std::runtime_error(error)));
 }
 
 geometry_msgs::TransformStamped TransformSource::lookUp(const std::string& target, const std::string& source,
@@ -58,7 +60,8 @@ geometry_msgs::TransformStamped TransformSource::lookUp(const std::string& targe
   }
   catch (const tf2::TransformException& exception)
   {
-    throw std::runtime_error("tf does not know the frame '" + source + "' in '" + target + "': " + oneLine(exception));
+    throw std::runtime_error("tf does not know the frame '" + shown(source) + "' in '" + shown(target) +
+                             "': " + oneLine(exception));
   }
 }
 

@@ -2,6 +2,9 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "view_servo/ros/view_answer.h"
 
+#include "view_servo/parameters/error_text.h"
+#include "view_servo/parameters/shown_text.h"
+
 #include <stdexcept>
 
 namespace view_servo
@@ -23,7 +26,7 @@ bool ViewAnswer::add(const std::string& view, const std::string& goal, bool refu
   }
   if (view != view_)
   {
-    other_view_ = what_ + " on '" + topic_ + "' are of view '" + view + "', not of '" + view_ + "'";
+    other_view_ = what_ + " on '" + topic_ + "' are of view '" + shown(view) + "', not of '" + view_ + "'";
     return false;
   }
   if (!goal.empty() && goal != goal_)
@@ -33,7 +36,8 @@ bool ViewAnswer::add(const std::string& view, const std::string& goal, bool refu
   other_view_.clear();
   if (refused)
   {
-    refusal_ = what_ + " on '" + topic_ + "': " + (reason.empty() ? "the view is refused" : reason);
+    refusal_ = what_ + " on '" + topic_ +
+               "': " + (reason.empty() ? "the view is refused" : oneLine(std::runtime_error(reason)));
     return false;
   }
   refusal_.clear();

@@ -212,13 +212,14 @@ private:
   void readRegion(const YAML::Node& node)
   {
     const Eigen::Vector4d values = vector<4>(node, "'region'");
-    const Eigen::Vector4i pixels = values.cast<int>();
-    world_.region = cv::Rect(pixels(0), pixels(1), pixels(2), pixels(3));
-    const cv::Rect image(0, 0, world_.camera.width, world_.camera.height);
-    if (pixels.cast<double>() != values || world_.region.empty() || (world_.region & image) != world_.region)
+    const bool whole = values.array().round().matrix() == values;
+    if (!whole || values.minCoeff() < 0.0 || values(2) < 1.0 || values(3) < 1.0 ||
+        values(0) + values(2) > world_.camera.width || values(1) + values(3) > world_.camera.height)
     {
       fail(node, "'region' must be [x, y, width, height] in whole pixels, within the image");
     }
+    const Eigen::Vector4i pixels = values.cast<int>();
+    world_.region = cv::Rect(pixels(0), pixels(1), pixels(2), pixels(3));
   }
 
   void readCamera(const YAML::Node& node)

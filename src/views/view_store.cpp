@@ -6,6 +6,7 @@
 #include "stored_files.h"
 #include "view_servo/images/image_io.h"
 #include "view_servo/parameters/error_text.h"
+#include "view_servo/parameters/shown_text.h"
 #include "view_servo/parameters/yaml_text.h"
 
 #include <yaml-cpp/yaml.h>
@@ -303,7 +304,7 @@ void requireValidName(const std::string& action, const std::string& name)
 {
   if (!isValidViewName(name))
   {
-    fail(action, name.substr(0, MAX_NAME_LENGTH),
+    fail(action, shown(name.substr(0, MAX_NAME_LENGTH)),
          "a name is 1 to 64 letters, digits, '_' and '-', and starts with a letter or digit");
   }
 }

@@ -192,6 +192,11 @@ TEST(Camera, SaysWhichFieldCannotBeUsed)
   EXPECT_EQ(fault_of([](Camera& c) { c.rectification(0, 0) = 2.0; }), "R is no rotation");
   EXPECT_EQ(fault_of([](Camera& c) { c.projection(1, 1) = -3.0; }), "the focal lengths in P have to be positive");
   EXPECT_EQ(fault_of([](Camera& c) { c.height = 0; }), "width and height have to be positive");
+  EXPECT_EQ(fault_of([](Camera& c) { c.distortion_model = "plumb\nbob"; }),
+            "distortion_model 'plumb?bob' is not known: plumb_bob, rational_polynomial and equidistant are");
+  EXPECT_EQ(fault_of([](Camera& c) { c.width = 2147483647; }),
+            "images of 2147483647 x 480 pixels are too large: over 50 million");
+  EXPECT_EQ(fault_of([](Camera& c) { c.width = c.height = 7000; }), "");
   EXPECT_EQ(fault_of([](Camera& c) { c.distortion.resize(3); }),
             "D has 3 coefficients, distortion_model 'plumb_bob' has 4 or 5");
   EXPECT_EQ(fault_of([](Camera& c) { c.distortion_model = "equidistant"; }),

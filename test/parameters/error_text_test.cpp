@@ -2,6 +2,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "view_servo/parameters/error_text.h"
 
+#include "view_servo/parameters/shown_text.h"
+
 #include <gtest/gtest.h>
 #include <opencv2/core.hpp>
 
@@ -16,6 +18,16 @@ namespace
 TEST(OneLine, JoinsLines)
 {
   EXPECT_EQ(oneLine(std::runtime_error("no camera:\nlook there\n\n")), "no camera: look there");
+}
+
+TEST(Shown, IsOneShortLine)
+{
+  EXPECT_EQ(shown("rgb8; jpeg compressed bgr8"), "rgb8; jpeg compressed bgr8");
+  EXPECT_EQ(shown("caf\xC3\xA9"), "caf\xC3\xA9");
+  EXPECT_EQ(shown(std::string("a\nb\r\tc\x7F\0d", 9)), "a?b??c??d");
+  EXPECT_EQ(shown(std::string(80, 'x')), std::string(80, 'x'));
+  EXPECT_EQ(shown(std::string(1000, 'x')), std::string(80, 'x') + "...");
+  EXPECT_EQ(shown(""), "");
 }
 
 TEST(OneLine, IsNeverEmpty)

@@ -146,6 +146,11 @@ TEST(CompressedImage, ThatIsDamagedIsRefusedInOneLineThatNamesTopicAndCause)
   depth.format = "32FC1; compressedDepth png";
   EXPECT_NE(errorOf(depth).find("depth image"), std::string::npos) << errorOf(depth);
   EXPECT_NE(received(depth).fault, "");
+  sensor_msgs::CompressedImage odd = whole;
+  odd.format = "mono8;\njpeg";
+  odd.data.resize(100);
+  EXPECT_NE(errorOf(odd).find("format 'mono8;?jpeg'"), std::string::npos) << errorOf(odd);
+  EXPECT_EQ(errorOf(odd).find('\n'), std::string::npos) << errorOf(odd);
 }
 
 TEST(CompressedImage, WithTooManyPixelsIsRefusedByItsHeader)

@@ -109,6 +109,17 @@ TEST(CameraConversion, TellsAnUncalibratedCamera)
   EXPECT_EQ(toCamera(exampleInfo()).fault(), "");
 }
 
+TEST(CameraConversion, TellsSizesThatNoCameraHas)
+{
+  sensor_msgs::CameraInfo info = exampleInfo();
+  info.width = 4294967295U;
+  EXPECT_EQ(toCamera(info).fault(), "images of 2147483647 x 480 pixels are too large: over 50 million");
+  info = exampleInfo();
+  info.roi.width = info.roi.height = 4294967295U;
+  info.binning_x = info.binning_y = 2;
+  EXPECT_EQ(toCamera(info).fault(), "images of 2147483647 x 2147483647 pixels are too large: over 50 million");
+}
+
 TEST(ImageConversion, TurnsEveryEncodingIntoTheSameGrey)
 {
   const cv::Mat bgr = examplePicture();
@@ -192,6 +203,10 @@ TEST(ImageConversion, NamesWhatItCannotUse)
   sensor_msgs::Image image = good;
   image.encoding = "jpeg";
   EXPECT_NE(errorOf(image).find("'the image': encoding 'jpeg'"), std::string::npos) << errorOf(image);
+
+  image.encoding = "mono\n8";
+  EXPECT_NE(errorOf(image).find("'the image': encoding 'mono?8'"), std::string::npos) << errorOf(image);
+  EXPECT_EQ(errorOf(image).find('\n'), std::string::npos) << errorOf(image);
 
   image = good;
   image.data.resize(10);

@@ -86,5 +86,14 @@ TEST_F(ViewAnswerTest, OneOfSeveralIsEnough)
   EXPECT_EQ(missingAnswer({ &answer_, &other }), "");
 }
 
+TEST_F(ViewAnswerTest, TellsInOneLineWhateverOthersSend)
+{
+  answer_.expect("dock", "");
+  EXPECT_FALSE(answer_.add(about("a\nb", "")));
+  EXPECT_EQ(answer_.missing(), "matches on '/point_matches' are of view 'a?b', not of 'dock'");
+  EXPECT_FALSE(answer_.add(about("dock", "", "too\n  dark")));
+  EXPECT_EQ(answer_.missing(), "matches on '/point_matches': too dark");
+}
+
 }  // namespace
 }  // namespace view_servo

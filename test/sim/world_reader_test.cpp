@@ -134,6 +134,14 @@ TEST(WorldReader, FaultsNameFileAndLine)
   expectFault("goal:", "gaol:", "7", "unknown key 'gaol'");
   EXPECT_NE(faultOf("goal: {x: 0, y: 0}\n", "").find("needs 'goal'"), std::string::npos);
   EXPECT_NE(faultOf("kind: nomad, ", "kind: [nomad, ").find("world.yaml"), std::string::npos);
+  for (const char* region : { "[1e300, 0, 9, 9]", "[0, 0, 9, 1e300]", "[-1, 0, 9, 9]", "[0.5, 0, 9, 9]",
+                              "[0, 0, 641, 9]", "[2147483647, 0, 2147483647, 9]", "[0, 0, 0, 9]" })
+  {
+    const std::string line = "region: " + std::string(region) + "\n";
+    expectFault("goal:", line + "goal:", "7",
+                "'region' must be [x, y, width, height] in whole pixels, within the image");
+  }
+  EXPECT_EQ(faultOf("goal:", "region: [1, 2, 639, 478]\ngoal:"), "");
   EXPECT_THROW(readWorld("/nowhere/world.yaml"), std::invalid_argument);
 }
 

@@ -187,6 +187,7 @@ TEST_F(ViewStoreTest, RefusesNamesThatAreNotFileNames)
     EXPECT_ERROR(store_.revision(name), "a name is 1 to 64 letters");
     EXPECT_ERROR(store_.remove(name), "a name is 1 to 64 letters");
   }
+  EXPECT_ERROR(store_.load("a\nb"), "'a?b': a name is 1 to 64 letters");
   EXPECT_EQ(readText(directory_.path() / "outside.yaml"), "untouched");
   EXPECT_FALSE(fs::exists(store_.directory()));
 }
