@@ -182,8 +182,6 @@ TYPED_TEST_P(EveryDriverTest, KeepsLimitsThatPeopleChangeWhileItDrives)
 
 TYPED_TEST_P(EveryDriverTest, TakesGainsThatPeopleChangeWhileItDrives)
 {
-  const std::chrono::milliseconds at_once(static_cast<int>(100.0 * SLOWDOWN));
-  this->drive();
   const std::map<std::string, double> started = this->change({});
   std::map<std::string, double> gains;
   for (const auto& [name, value] : started)
@@ -194,18 +192,19 @@ TYPED_TEST_P(EveryDriverTest, TakesGainsThatPeopleChangeWhileItDrives)
     }
   }
   ASSERT_EQ(gains.size(), 2U);
-  const auto before = std::chrono::steady_clock::now();
-  EXPECT_TRUE(waitUntil([&] { return this->commands_.lastMotionAfter(before) > 0.3; })) << this->reason();
-  const double fast = this->commands_.fastestAfter(before);
   std::map<std::string, double> live = this->change(gains);
   for (const auto& [name, gain] : gains)
   {
     EXPECT_NEAR(live[name], gain, 1e-9) << name;
   }
-  const auto changed = std::chrono::steady_clock::now() + 3 * at_once;  // it brakes within its acceleration
-  EXPECT_TRUE(waitUntil([&] { return this->commands_.lastMotionAfter(changed) > 0.3; })) << this->reason();
-  EXPECT_LT(this->commands_.fastestAfter(changed), 0.6 * fast);
+  this->drive();
+  const auto before = std::chrono::steady_clock::now();
+  EXPECT_TRUE(waitUntil([&] { return this->commands_.lastMotionAfter(before) > 0.3; })) << this->reason();
+  const double slow = this->commands_.fastestAfter(before);
+  const auto changed = std::chrono::steady_clock::now();
   EXPECT_EQ(this->change(started), started);
+  EXPECT_TRUE(waitUntil([&] { return this->commands_.fastestAfter(changed) > 1.4 * slow; }))
+      << slow << ' ' << this->commands_.fastestAfter(changed) << ' ' << this->reason();
   EXPECT_NEAR(this->change({ { "gain", 1e9 } })["gain"], 2.0 * started.at("gain"), 1e-9);
   EXPECT_EQ(this->change(started), started);
 }

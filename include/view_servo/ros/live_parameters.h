@@ -92,10 +92,10 @@ LiveGroup liveGroup(const Params& params, std::vector<LiveNumber> numbers, std::
 }
 
 /**
- * Lets people change numbers of a node while it runs, by the clients of dynamic_reconfigure: rqt_reconfigure, or
- * `rosrun dynamic_reconfigure dynparam set NODE NAME VALUE`. Values beyond the limits become the nearest that is
- * allowed; unknown names and values that are no numbers change nothing, and values that do not go together leave their
- * group as it is; all that is logged. The parameter server keeps the values that the node was started with.
+ * Lets people change numbers of a node while it runs, by rqt_reconfigure and the other clients of dynamic_reconfigure.
+ * Values beyond the limits become the nearest that is allowed; unknown names and values that are no numbers change
+ * nothing, and values that do not go together leave their group as it is; all that is logged. The parameter server keeps
+ * the values that the node was started with.
  *
  * Publishes, latched: `~parameter_descriptions` (dynamic_reconfigure/ConfigDescription), `~parameter_updates`
  * (dynamic_reconfigure/Config). Service: `~set_parameters` (dynamic_reconfigure/Reconfigure), whose response is what is
