@@ -8,12 +8,8 @@
 
 #include <rosbag/bag.h>
 #include <rosbag/view.h>
-#include <sensor_msgs/CameraInfo.h>
-#include <tf2/buffer_core.h>
 #include <tf2/exceptions.h>
-#include <tf2_msgs/TFMessage.h>
 
-#include <cstddef>
 #include <exception>
 #include <filesystem>
 #include <stdexcept>
@@ -29,30 +25,13 @@ std::string topicOf(const std::string& space, const std::string& name)
   return "/" + withoutSlash(space) + "/" + name;
 }
 
-/** All that the bag knows of frames. */
-void fill(tf2::BufferCore& frames, const rosbag::Bag& bag)
+Camera cameraIn(const HandEyeRecording& recording, const std::string& topic)
 {
-  for (const rosbag::MessageInstance& instance : rosbag::View(bag, rosbag::TypeQuery("tf2_msgs/TFMessage")))
-  {
-    const bool fixed = instance.getTopic() == "/tf_static";
-    const tf2_msgs::TFMessage::ConstPtr message = instance.instantiate<tf2_msgs::TFMessage>();
-    for (std::size_t i = 0; message && i < message->transforms.size(); ++i)
-    {
-      frames.setTransform(message->transforms[i], "bag", fixed);
-    }
-  }
-}
-
-Camera cameraIn(const rosbag::Bag& bag, const std::string& topic)
-{
-  rosbag::View messages(bag, rosbag::TopicQuery(topic));
-  const sensor_msgs::CameraInfo::ConstPtr info =
-      messages.size() > 0 ? messages.begin()->instantiate<sensor_msgs::CameraInfo>() : nullptr;
-  if (!info)
+  if (!recording.info)
   {
     throw std::runtime_error("no camera_info is in it on '" + topic + "': record that, too, or say --camera");
   }
-  Camera camera = toCamera(*info);
+  Camera camera = toCamera(*recording.info);
   if (const std::string fault = camera.fault(); !fault.empty())
   {
     throw std::runtime_error("'" + topic + "': " + fault);
@@ -60,21 +39,51 @@ Camera cameraIn(const rosbag::Bag& bag, const std::string& topic)
   return camera;
 }
 
-HandEyePosesFile posesIn(const rosbag::Bag& bag, const HandEyeSources& sources)
+/** Sets what is in the bag. */
+void read(const rosbag::Bag& bag, const HandEyeSources& sources, HandEyeRecording& recording)
+{
+  for (const rosbag::MessageInstance& instance : rosbag::View(bag, rosbag::TypeQuery("tf2_msgs/TFMessage")))
+  {
+    if (const tf2_msgs::TFMessage::ConstPtr message = instance.instantiate<tf2_msgs::TFMessage>())
+    {
+      recording.addTransforms(*message, instance.getTopic() == "/tf_static");
+    }
+  }
+  rosbag::View infos(bag, rosbag::TopicQuery(topicOf(sources.camera, "camera_info")));
+  if (infos.size() > 0)
+  {
+    recording.info = infos.begin()->instantiate<sensor_msgs::CameraInfo>();
+  }
+  for (const rosbag::MessageInstance& instance :
+       rosbag::View(bag, rosbag::TopicQuery(topicOf(sources.tracker, "homography"))))
+  {
+    recording.homographies.push_back(instance.instantiate<Homography>());
+  }
+}
+
+}  // namespace
+
+void HandEyeRecording::addTransforms(const tf2_msgs::TFMessage& message, bool fixed)
+{
+  for (const geometry_msgs::TransformStamped& transform : message.transforms)
+  {
+    frames.setTransform(transform, "bag", fixed);
+  }
+}
+
+HandEyePosesFile posesIn(const HandEyeRecording& recording, const HandEyeSources& sources)
 {
   const StoredView stored = ViewStore(viewsDir(sources.views_dir)).load(sources.view);
-  HandEyeCollector collector(handEyeViewOf(stored, cameraIn(bag, topicOf(sources.camera, "camera_info"))));
-  tf2::BufferCore frames(ros::Duration(1e8));  // however long the bag is
-  fill(frames, bag);
+  HandEyeCollector collector(handEyeViewOf(stored, cameraIn(recording, topicOf(sources.camera, "camera_info"))));
+  const tf2::BufferCore& frames = recording.frames;
 
   HandEyePosesFile result;
   const std::string topic = topicOf(sources.tracker, "homography");
   int followed = 0;
   int located = 0;
   std::string lacks;  // of the frames
-  for (const rosbag::MessageInstance& instance : rosbag::View(bag, rosbag::TopicQuery(topic)))
+  for (const Homography::ConstPtr& message : recording.homographies)
   {
-    const Homography::ConstPtr message = instance.instantiate<Homography>();
     if (!message || message->view != sources.view || message->valid == 0)
     {
       collector.clear();
@@ -120,8 +129,6 @@ HandEyePosesFile posesIn(const rosbag::Bag& bag, const HandEyeSources& sources)
   return result;
 }
 
-}  // namespace
-
 HandEyePosesFile readHandEyeBag(const std::string& path, const HandEyeSources& sources)
 {
   try
@@ -131,7 +138,9 @@ HandEyePosesFile readHandEyeBag(const std::string& path, const HandEyeSources& s
       throw std::runtime_error("there is no such file");
     }
     const rosbag::Bag bag(path, rosbag::bagmode::Read);
-    return posesIn(bag, sources);
+    HandEyeRecording recording;
+    read(bag, sources, recording);
+    return posesIn(recording, sources);
   }
   catch (const std::exception& error)
   {

@@ -15,10 +15,13 @@
 extern "C"
 {
   int fuzzArms(const std::uint8_t* data, std::size_t size);
+  int fuzzBags(const std::uint8_t* data, std::size_t size);
   int fuzzCameraInfo(const std::uint8_t* data, std::size_t size);
   int fuzzCameras(const std::uint8_t* data, std::size_t size);
   int fuzzHandEye(const std::uint8_t* data, std::size_t size);
+  int fuzzImageMessages(const std::uint8_t* data, std::size_t size);
   int fuzzImages(const std::uint8_t* data, std::size_t size);
+  int fuzzMessages(const std::uint8_t* data, std::size_t size);
   int fuzzRoutes(const std::uint8_t* data, std::size_t size);
   int fuzzSegments(const std::uint8_t* data, std::size_t size);
   int fuzzStructure(const std::uint8_t* data, std::size_t size);
@@ -66,7 +69,9 @@ TEST_P(FuzzSeedsTest, AreReadOrRefusedWithAReason)
 }
 
 INSTANTIATE_TEST_SUITE_P(Readers, FuzzSeedsTest,
-                         ::testing::Values(Target{ "arms", fuzzArms }, Target{ "camera_info", fuzzCameraInfo },
+                         ::testing::Values(Target{ "arms", fuzzArms }, Target{ "bags", fuzzBags },
+                                           Target{ "image_messages", fuzzImageMessages },
+                                           Target{ "messages", fuzzMessages }, Target{ "camera_info", fuzzCameraInfo },
                                            Target{ "cameras", fuzzCameras }, Target{ "hand_eye", fuzzHandEye },
                                            Target{ "images", fuzzImages }, Target{ "routes", fuzzRoutes },
                                            Target{ "segments", fuzzSegments }, Target{ "structure", fuzzStructure },
