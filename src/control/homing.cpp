@@ -2,6 +2,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "view_servo/control/homing.h"
 
+#include "view_servo/control/place_watch.h"
 #include "view_servo/geometry/camera_warp.h"
 #include "view_servo/geometry/fundamental.h"
 #include "view_servo/parameters/faults.h"
@@ -21,6 +22,16 @@ namespace view_servo
 namespace
 {
 constexpr double ODOMETRY_KEPT = 10.0;  // [s]
+constexpr PlaceWatchLimits PLACE_LIMITS{ 0.015, 0.02, 0.04, 0.03, 0.2, 0.15 };
+
+const char* const MOVES_OTHERWISE = "the picture does not move as the base does by odometry";
+
+Eigen::Isometry3d toIsometry(const PlanarPose& pose)
+{
+  Eigen::Isometry3d result(Eigen::AngleAxisd(pose.yaw, Eigen::Vector3d::UnitZ()));
+  result.translation() << pose.x, pose.y, 0.0;
+  return result;
+}
 
 /** Chapter 5 as printed. */
 class ThesisHoming : public Homing
@@ -211,6 +222,10 @@ public:
     {
       return Course();
     }
+    if (isTesting())
+    {
+      return *test_;
+    }
     Course course = law_->course();
     if (blind_)
     {
@@ -232,6 +247,8 @@ protected:
       blind_to_ = base_in_odom;
       blind_distance_ += moved.distance();
       blind_turn_ += std::abs(moved.yaw);
+      constexpr double ENOUGH = 0.75;  // of the step, whose last part is slow
+      tested_ = tested_ || (test_ && compose(inverse(test_->start), base_in_odom).distance() >= ENOUGH * test_->length);
       approach(base_in_odom, false, false);
     }
   }
@@ -302,6 +319,7 @@ protected:
       {
         tracked_ = report_.tracked = true;
         correctScale(camera, result.pose);
+        watch_.add(toIsometry(camera), toIsometry(result.pose), scale_);
         report_.inliers = result.supporting;
         report_.confidence = static_cast<double>(result.supporting) / result.looked_for;
         report_.displacement = result.displacement;
@@ -466,6 +484,10 @@ private:
       return false;
     }
     tracker_ = std::move(fresh);
+    if (view_in_odom_)
+    {
+      watch_.restart(toIsometry(*view_in_odom_));
+    }
     scale_ = 1.0;
     scale_corrections_ = from_view ? ENOUGH_CORRECTIONS : 0;
     scale_variance_ = 0.0;
@@ -599,6 +621,17 @@ private:
                   blank ? "the image shows nothing" : "the view is not found any more");
       return;
     }
+    if (!watch_.contradicted())
+    {
+      contradicted_since_ = NOT_A_NUMBER;
+    }
+    else
+    {
+      within_since_ = NOT_A_NUMBER;
+      contradicted_since_ = std::fmin(contradicted_since_, stamp);
+      giveUpAfter(stamp, contradicted_since_, MOVES_OTHERWISE, HomingState::LOST, MOVES_OTHERWISE);
+      return;
+    }
     if (!tracked_)
     {
       within_since_ = NOT_A_NUMBER;
@@ -639,10 +672,26 @@ private:
     // Whatever the structure and its scale say, the points must be where the view has them.
     const bool in_place = report_.displacement <= IN_PLACE && report_.confidence >= ARRIVED_CONFIDENCE &&
                           report_.similarity >= params_.min_similarity;
-    report_.at_view = report_.distance <= params_.arrival_distance && std::abs(goal.yaw) <= params_.arrival_yaw &&
+    const bool near = report_.distance <= params_.arrival_distance && std::abs(goal.yaw) <= params_.arrival_yaw &&
                       report_.displacement <= AT_VIEW_DISPLACEMENT && report_.similarity >= params_.min_similarity;
+    report_.at_view = near && watch_.trusted();
     const bool within =
         in_place && report_.distance <= law_->tolerance() && std::abs(goal.yaw) <= params_.approach.yaw_tolerance;
+    if (isInDoubt(in_place, within))
+    {
+      within_since_ = NOT_A_NUMBER;
+      doubted_since_ = std::fmin(doubted_since_, stamp);
+      if (isTesting())
+      {
+        setState(HomingState::DOCKING, "it steps back to see whether the view moves as it does");
+      }
+      else
+      {
+        giveUpAfter(stamp, doubted_since_, MOVES_OTHERWISE, HomingState::LOST, MOVES_OTHERWISE);
+      }
+      return;
+    }
+    doubted_since_ = NOT_A_NUMBER;
     if (!within)
     {
       within_since_ = NOT_A_NUMBER;
@@ -667,6 +716,38 @@ private:
     {
       setState(HomingState::APPROACHING, "the view's points are tracked");
     }
+  }
+
+  /**
+   * Whether something speaks against what looks like the view, as it appeared at once where it was not. The base is to
+   * step back then, once, to see whether the view moves.
+   * @param in_place whether the view's points are where they have to be. @param within whether the base is, too.
+   */
+  bool isInDoubt(bool in_place, bool within)
+  {
+    if (within && !watch_.trusted() && !test_)
+    {
+      constexpr double LENGTH = 0.08;  // [m]
+      constexpr double SPEED = 0.05;   // [m/s]
+      tested_ = false;
+      test_.emplace();
+      test_->kind = Course::STEP;
+      test_->start = *odometry_.newest();
+      test_->heading = M_PI;
+      test_->length = LENGTH;
+      test_->speed = SPEED;
+    }
+    if (watch_.trusted())
+    {
+      test_.reset();
+    }
+    return test_ && (in_place || isTesting());
+  }
+
+  /** Whether the base is on its step back. */
+  bool isTesting() const
+  {
+    return test_ && !tested_;
   }
 
   void giveUpAfter(double stamp, double since, const std::string& failure, HomingState waiting, const std::string& why)
@@ -697,12 +778,17 @@ private:
   double scale_variance_ = 0.0;                                // of the parts by which the last ones changed it
   Eigen::Matrix3d view_covariance_ = Eigen::Matrix3d::Zero();  // of the view's place in odometry's frame [m, rad]
   std::deque<Place> trail_;                                    // of the camera, newest last
-  bool tracked_ = false;                                       // in the last image
-  bool blind_ = true;                                          // what was followed last were matches
-  double last_known_ = 0.0;                                    // last_trace_ when the law of approach was told of it
-  double way_known_ = 0.0;                                     // stamp of the last image with a way to the view
-  PlanarPose rest_;              // where the base stood when the first of these images was taken
-  int images_at_rest_ = 0;       // in a row
+  PlaceWatch watch_{ PLACE_LIMITS };
+  double contradicted_since_ = NOT_A_NUMBER;  // stamp of the first image with which watch_ was so
+  double doubted_since_ = NOT_A_NUMBER;       // of the first at the view that watch_ does not trust
+  std::optional<Course> test_;                // the step back, from when the view was doubted until it is trusted
+  bool tested_ = false;                       // the step back has been made
+  bool tracked_ = false;                      // in the last image
+  bool blind_ = true;                         // what was followed last were matches
+  double last_known_ = 0.0;                   // last_trace_ when the law of approach was told of it
+  double way_known_ = 0.0;                    // stamp of the last image with a way to the view
+  PlanarPose rest_;                           // where the base stood when the first of these images was taken
+  int images_at_rest_ = 0;                    // in a row
   PlanarPose blind_to_;          // the newest base pose; the next two are the way there since the view was seen
   double blind_distance_ = 0.0;  // [m]
   double blind_turn_ = 0.0;      // [rad]

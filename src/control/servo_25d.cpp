@@ -26,6 +26,8 @@ namespace view_servo
 {
 namespace
 {
+constexpr PlaceWatchLimits PLACE_LIMITS{ 0.004, 0.01, 0.004, 0.01, 0.05, 0.15 };
+
 /** The displacement of a body that moves by a twist of its own for a time: where its frame is in the former one. */
 Eigen::Isometry3d displacement(const Twist& twist, double duration)
 {
@@ -106,7 +108,10 @@ struct Servo25d::Task
 };
 
 Servo25d::Servo25d(const ServoTarget& target, const Servo25dParams& params)
-  : params_(params), target_(target), chosen_((target.k.inverse() * target.point.homogeneous()).hnormalized())
+  : params_(params),
+    target_(target),
+    chosen_((target.k.inverse() * target.point.homogeneous()).hnormalized()),
+    watch_(PLACE_LIMITS)
 {
   requireNoFaults("parameters of 2.5D servoing", params.validate());
   if (!(gainsAt(target.point).minCoeff() > 0.0))
@@ -156,10 +161,27 @@ void Servo25d::add(const PlaneView& view)
     distance_ = view.distance;
   }
   lost_since_.reset();
-  updateReport(view.stamp);
+  moveOnTo(view.stamp);
+  Eigen::Isometry3d view_in_camera(view.motion.rotation);
+  view_in_camera.translation() = view.motion.translation_over_distance;
+  if (!sent_.empty())  // in a dry run nobody knows how the camera moves
+  {
+    watch_.add(camera_, view_in_camera, distance());
+  }
+  updateReport();
+  judge(view.stamp);
 }
 
-void Servo25d::updateReport(double stamp)
+void Servo25d::moveOnTo(double stamp)
+{
+  if (moved_until_ && stamp > *moved_until_)
+  {
+    camera_ = camera_ * motionSince(*moved_until_, stamp).inverse();
+  }
+  moved_until_ = moved_until_ ? std::max(*moved_until_, stamp) : stamp;
+}
+
+void Servo25d::updateReport()
 {
   const Servo25dError error = servo25dError(view_->motion, chosen_);
   report_.error = error;
@@ -169,9 +191,24 @@ void Servo25d::updateReport(double stamp)
   report_.rotation_error = error.rotation.norm();
   report_.translation_error = view_->motion.translation_over_distance.norm() * distance();
   report_.inliers = view_->inliers;
-  const bool within = report_.translation_error <= params_.translation_tolerance &&
-                      report_.rotation_error <= params_.rotation_tolerance;
-  if (!within)
+}
+
+void Servo25d::judge(double stamp)
+{
+  const bool at_view = report_.translation_error <= params_.translation_tolerance &&
+                       report_.rotation_error <= params_.rotation_tolerance;
+  if (watch_.contradicted() || (at_view && !watch_.trusted()))
+  {
+    within_since_.reset();
+    doubted_since_ = doubted_since_.value_or(stamp);
+    report_.state = stamp - *doubted_since_ > params_.lost_timeout ? ServoState::FAILED : ServoState::LOST;
+    report_.reason = watch_.contradicted()
+                         ? "the picture does not move as the camera is told to"
+                         : "the view appeared at once where it was not, and has not been seen to move since";
+    return;
+  }
+  doubted_since_.reset();
+  if (!at_view)
   {
     within_since_.reset();
   }
@@ -179,7 +216,7 @@ void Servo25d::updateReport(double stamp)
   {
     within_since_ = stamp;
   }
-  const bool converged = within && stamp - *within_since_ >= params_.dwell;
+  const bool converged = at_view && stamp - *within_since_ >= params_.dwell;
   report_.state = converged ? ServoState::CONVERGED : ServoState::SERVOING;
   report_.reason = describe(report_.translation_error, report_.rotation_error);
   if (!distance_)
@@ -195,6 +232,7 @@ void Servo25d::addLoss(double stamp, const std::string& reason)
     return;
   }
   lost_since_ = lost_since_.value_or(stamp);
+  moveOnTo(stamp);
   within_since_.reset();
   report_.inliers = 0;
   if (view_ && stamp - view_->stamp <= params_.loss_tolerance)

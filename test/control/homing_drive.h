@@ -170,6 +170,8 @@ public:
     WRONG_MATCHES,   // images of the walls and any matches
     UNMATCHED,       // images of the walls, but the matcher finds nothing
     NOISY,           // the walls in bad light
+    COPY,            // a picture of the walls as the view shows them, held before the camera
+    FROZEN,          // the walls as they were seen when this began
     BLANK            // black images and no matches
   };
 
@@ -179,14 +181,23 @@ public:
     pushed_ = velocity;
   }
 
+  /** Somebody puts the base elsewhere, without odometry noticing. */
+  void carryTo(const PlanarPose& base)
+  {
+    odom_ = compose(compose(odom_, base_), inverse(base));
+    base_ = base;
+  }
+
   void step(Sight sight = Sight::WALLS)
   {
-    homing_->addOdometry(time(), base_);
+    frozen_ = sight == Sight::FROZEN ? frozen_.value_or(base_) : std::optional<PlanarPose>();
+    const PlanarPose seen_from = sight == Sight::COPY ? PlanarPose() : frozen_.value_or(base_);
+    homing_->addOdometry(time(), compose(odom_, base_));
     if (steps_ % 4 == 0)
     {
       const bool blank = sight == Sight::BLANK;
       const bool elsewhere = sight == Sight::NO_MATCHES || sight == Sight::RANDOM_MATCHES;
-      cv::Mat image = blank ? black_ : elsewhere ? something_else_ : walls_.image(base_);
+      cv::Mat image = blank ? black_ : elsewhere ? something_else_ : walls_.image(seen_from);
       if (sight == Sight::NOISY)
       {
         image = test::disturbed(image, 1.0, 0.0, 20.0, static_cast<std::uint64_t>(steps_ + 1));
@@ -196,8 +207,9 @@ public:
     if (steps_ % 10 == 0)
     {
       const bool any = sight == Sight::RANDOM_MATCHES || sight == Sight::WRONG_MATCHES;
-      const Correspondences pairs =
-          walls_.matches(base_, sight == Sight::WALLS || sight == Sight::NOISY ? 60 : 0, any ? 60 : 0, rng_);
+      const bool walls =
+          sight == Sight::WALLS || sight == Sight::NOISY || sight == Sight::COPY || sight == Sight::FROZEN;
+      const Correspondences pairs = walls_.matches(seen_from, walls ? 60 : 0, any ? 60 : 0, rng_);
       homing_->addMatches(time(), equallyTrusted(pairs));
     }
     const BaseVelocity wanted = homing_->command();
@@ -233,7 +245,9 @@ private:
   cv::Mat something_else_ = test::texturedPicture(99, cv::Size(Walls::WIDTH, Walls::HEIGHT));
   Rng rng_{ 5 };
   std::optional<BaseVelocity> pushed_;
-  PlanarPose base_;
+  std::optional<PlanarPose> frozen_;
+  PlanarPose odom_;  // of the view's base, in odometry's frame
+  PlanarPose base_;  // in the frame of the view's base
   double travelled_ = 0.0;
   int steps_ = 0;
 };

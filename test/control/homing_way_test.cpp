@@ -37,6 +37,10 @@ std::string nameOf(Drive::Sight sight)
       return "Noisy";
     case Drive::Sight::BLANK:
       return "Blank";
+    case Drive::Sight::COPY:
+      return "Copy";
+    case Drive::Sight::FROZEN:
+      return "Frozen";
   }
   return "";
 }

@@ -15,6 +15,7 @@
 #include <cmath>
 #include <cstdint>
 #include <deque>
+#include <functional>
 #include <limits>
 #include <stdexcept>
 #include <string>
@@ -68,7 +69,7 @@ public:
 
   EuclideanHomography motion() const
   {
-    const Eigen::Isometry3d now = camera_.inverse();
+    const Eigen::Isometry3d now = (shown ? shown(camera_) : camera_).inverse();
     return { now.linear(), now.translation() / DISTANCE, normal_ };
   }
   Eigen::Vector2d point() const
@@ -120,6 +121,8 @@ public:
   bool feed_forward = true;
   bool tell_distance = false;
   bool visible = true;
+  std::function<Eigen::Isometry3d(const Eigen::Isometry3d&)>
+      shown;  // from where a camera sees the plane; empty: from its pose
 
 private:
   Eigen::Isometry3d camera_;
@@ -389,6 +392,97 @@ TEST(Servo25d, TakesOtherGainsWhileItDrives)
   Servo25d servo(target(), params);
   EXPECT_THROW(servo.setGains(2.0, 1.0), std::invalid_argument) << "near_gain is the smaller one";
   EXPECT_THROW(servo.setGains(0.0, 1.0), std::invalid_argument);
+}
+
+// ---- what looks like the view and is not
+
+class Servo25dCopiesTest : public testing::Test
+{
+protected:
+  static Plant start()
+  {
+    Eigen::Isometry3d camera(Eigen::AngleAxisd(0.2, Eigen::Vector3d(0.3, 0.5, 0.8).normalized()));
+    camera.translation() << 0.12, -0.08, -0.1;
+    return Plant(camera, Eigen::Vector3d(0.1, 0.2, -1.0).normalized() * -1.0, Servo25dParams());
+  }
+  static void run(Plant& plant, double duration)
+  {
+    const double end = plant.time() + duration;
+    while (plant.time() < end && plant.servo.report().state != ServoState::CONVERGED &&
+           plant.servo.report().state != ServoState::FAILED)
+    {
+      plant.step();
+    }
+  }
+};
+
+TEST_F(Servo25dCopiesTest, IsNotDeceivedByAPictureOfTheViewHeldBefore)
+{
+  for (const double begin : { 0.3, 0.8, 1.5 })
+  {
+    Plant plant = start();
+    run(plant, begin);
+    const Eigen::Vector3d before = plant.camera().translation();
+    plant.shown = [](const Eigen::Isometry3d&) {
+      return Eigen::Isometry3d(Eigen::Isometry3d::Identity());
+    };
+    run(plant, 20.0);
+    EXPECT_EQ(plant.servo.report().state, ServoState::FAILED) << begin << ": " << plant.servo.report().reason;
+    EXPECT_LT((plant.camera().translation() - before).norm(), 0.02) << begin;
+  }
+}
+
+TEST_F(Servo25dCopiesTest, ConvergesWhenThePictureIsTakenAway)
+{
+  for (const double begin : { 0.3, 1.5 })
+  {
+    Plant plant = start();
+    run(plant, begin);
+    plant.shown = [](const Eigen::Isometry3d&) {
+      return Eigen::Isometry3d(Eigen::Isometry3d::Identity());
+    };
+    run(plant, 2.0);
+    plant.shown = nullptr;
+    run(plant, 30.0);
+    EXPECT_EQ(plant.servo.report().state, ServoState::CONVERGED) << begin << ": " << plant.servo.report().reason;
+    EXPECT_LT(plant.camera().translation().norm(), 0.0012);
+  }
+}
+
+TEST_F(Servo25dCopiesTest, StandsWhenTheCameraSendsOneImageAgainAndAgain)
+{
+  for (const double begin : { 0.0, 0.3, 0.8 })
+  {
+    Plant plant = start();
+    run(plant, begin);
+    const Eigen::Isometry3d before = plant.camera();
+    plant.shown = [before](const Eigen::Isometry3d&) {
+      return before;
+    };
+    run(plant, 30.0);
+    EXPECT_EQ(plant.servo.report().state, ServoState::FAILED) << begin << ": " << plant.servo.report().reason;
+    EXPECT_LT((plant.camera().translation() - before.translation()).norm(), 0.12) << begin;
+  }
+}
+
+TEST_F(Servo25dCopiesTest, StandsWhenTheCameraIsMountedTheOtherWayRound)
+{
+  Plant plant = start();
+  plant.shown = [](const Eigen::Isometry3d& camera) {
+    return Eigen::Isometry3d(camera * Eigen::AngleAxisd(M_PI, Eigen::Vector3d::UnitZ()));
+  };
+  const Eigen::Isometry3d before = plant.camera();
+  run(plant, 40.0);
+  EXPECT_EQ(plant.servo.report().state, ServoState::FAILED) << plant.servo.report().reason;
+  EXPECT_LT((plant.camera().translation() - before.translation()).norm(), 0.2);
+}
+
+TEST_F(Servo25dCopiesTest, ADryRunDoesNotKnowHowTheCameraMoves)
+{
+  Plant plant = start();
+  plant.feed_forward = false;
+  run(plant, 60.0);
+  EXPECT_EQ(plant.servo.report().state, ServoState::CONVERGED) << plant.servo.report().reason;
 }
 
 TEST(Servo25d, NumbersThatAreNoneDriveNothing)

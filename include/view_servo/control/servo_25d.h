@@ -3,11 +3,13 @@
 #pragma once
 
 #include "view_servo/control/goal_rules.h"
+#include "view_servo/control/place_watch.h"
 #include "view_servo/control/velocity_limiter.h"
 #include "view_servo/geometry/euclidean_homography.h"
 #include "view_servo/parameters/parameter.h"
 
 #include <Eigen/Core>
+#include <Eigen/Geometry>
 
 #include <deque>
 #include <limits>
@@ -115,6 +117,9 @@ Progress toProgress(const ServoReport& report);
  * border, in x or in y, the slower the camera turns and changes the depth, while the point is led back as fast as ever.
  * So the point turns back at the margin, whatever the distance.
  *
+ * A view that does not move as the commands move the camera, as a picture of it held before the camera, is not believed:
+ * the camera stands, and servoing gives up after params.lost_timeout.
+ *
  * When an image has been evaluated, the camera has already moved on by the commands since. This motion is fed forward,
  * so that errors decay as commanded.
  *
@@ -163,13 +168,17 @@ private:
     Twist twist;
   };
 
+  /** Takes camera_ to the time of an image. */
+  void moveOnTo(double stamp);
   /** How the camera has moved by the twists that were sent: X_end = motion X_begin. */
   Eigen::Isometry3d motionSince(double begin, double end) const;
   /** ServoReport::gains of a chosen point at a pixel. */
   Eigen::Vector2d gainsAt(const Eigen::Vector2d& pixel) const;
   /** d, or params.distance while that is not known [m]. */
   double distance() const;
-  void updateReport(double stamp);
+  void updateReport();
+  /** What an image with the view leads to, by how far the view can be believed. */
+  void judge(double stamp);
 
   Servo25dParams params_;
   ServoTarget target_;
@@ -178,6 +187,11 @@ private:
   std::optional<PlaneView> view_;   // the last one
   std::optional<double> distance_;  // d, once it is known [m]
   std::deque<Sent> sent_;
+  Eigen::Isometry3d camera_ = Eigen::Isometry3d::Identity();  // at the last image, by the twists sent since the first
+  std::optional<double> moved_until_;                         // stamp of that image [s]
+  PlaceWatch watch_;
+  std::optional<double>
+      doubted_since_;                 // stamp of the first image that watch_ does not believe [s]; empty while it does
   std::optional<double> lost_since_;  // stamp of the first image without the view [s]; empty while it is seen
   std::optional<double>
       within_since_;  // stamp since which both errors are within tolerance [s]; empty while they are not
