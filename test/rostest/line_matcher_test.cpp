@@ -10,7 +10,6 @@
 #include <opencv2/imgproc.hpp>
 
 #include <cmath>
-#include <functional>
 #include <set>
 #include <string>
 #include <vector>
@@ -79,7 +78,7 @@ protected:
     EXPECT_GT(response.elapsed_ms, 0.0);
   }
 
-  static void expectRefusal(const MatchLines::Response& response, const std::string& naming)
+  void expectRefusal(const MatchLines::Response& response, const std::string& naming) const override
   {
     expectFailure(response, naming);
     EXPECT_TRUE(response.plane_homographies.empty());
@@ -213,49 +212,25 @@ TEST_F(LineMatcherNodeTest, FindsNoPlaneInUnrelatedImages)
 
 TEST_F(LineMatcherNodeTest, RefusesBadInputAndGoesOn)
 {
-  struct Case
-  {
-    std::string what;
-    std::function<void(MatchLines::Request&)> spoil;
-    std::string naming;
-  };
-  const auto query = [](const std::string& path) {
-    return [path](MatchLines::Request& request) {
-      request.query = ImageSource();
-      request.query.path = path;
-    };
-  };
-  const auto view = [](const std::string& name) {
-    return [name](MatchLines::Request& request) {
-      request.reference = ImageSource();
-      request.reference.view = name;
-    };
-  };
   const std::string good = file("reference.png", picture_);
-  const std::vector<Case> cases = {
+  const std::vector<BadRequest> requests = {
     { "groups", [](MatchLines::Request& request) { request.groups = "quadruplets"; }, "groups: 'quadruplets'" },
-    { "missing file", query("/nowhere/picture.png"), "/nowhere/picture.png" },
-    { "not an image", query(directory_.path().string()), directory_.path().string() },
-    { "1x1", query(file("dot.png", cv::Mat(1, 1, CV_8UC1, cv::Scalar(9)))), "dot.png" },
-    { "constant", query(file("constant.png", cv::Mat(360, 480, CV_8UC1, cv::Scalar(90)))), "0 in the current image" },
-    { "small", query(file("small.png", cv::Mat(3, 2, CV_8UC1, cv::Scalar(90)))), "" },
+    { "missing file", fileAsQuery("/nowhere/picture.png"), "/nowhere/picture.png" },
+    { "not an image", fileAsQuery(directory_.path().string()), directory_.path().string() },
+    { "1x1", fileAsQuery(file("dot.png", cv::Mat(1, 1, CV_8UC1, cv::Scalar(9)))), "dot.png" },
+    { "constant", fileAsQuery(file("constant.png", cv::Mat(360, 480, CV_8UC1, cv::Scalar(90)))),
+      "0 in the current image" },
+    { "small", fileAsQuery(file("small.png", cv::Mat(3, 2, CV_8UC1, cv::Scalar(90)))), "" },
     { "two fields", [&](MatchLines::Request& request) { request.query.path = good; }, "path and image" },
     { "no field and no camera", [](MatchLines::Request& request) { request.query = ImageSource(); }, "camera" },
     { "unknown encoding", [](MatchLines::Request& request) { request.query.image.encoding = "h264"; }, "h264" },
-    { "unknown view", view("nobody"), "nobody" },
-    { "name with ../", view("../wall"), "../wall" },
-    { "name with /", view("a/b"), "a/b" },
-    { "name with a null", view(std::string("wall\0/x", 7)), "wall" },
-    { "long name", view(std::string(5000, 'a')), "" },
+    { "unknown view", viewAsReference("nobody"), "nobody" },
+    { "name with ../", viewAsReference("../wall"), "../wall" },
+    { "name with /", viewAsReference("a/b"), "a/b" },
+    { "name with a null", viewAsReference(std::string("wall\0/x", 7)), "wall" },
+    { "long name", viewAsReference(std::string(5000, 'a')), "" },
   };
-  for (const Case& bad : cases)
-  {
-    SCOPED_TRACE(bad.what);
-    MatchLines::Request request = goodRequest();
-    request.overlay = true;
-    bad.spoil(request);
-    expectRefusal(call(request), bad.naming);
-  }
+  expectRefusals(requests);
   expectPlane(call(goodRequest()));
 }
 

@@ -9,7 +9,6 @@
 #include <opencv2/imgproc.hpp>
 
 #include <cmath>
-#include <functional>
 #include <limits>
 #include <string>
 #include <utility>
@@ -60,7 +59,7 @@ protected:
     EXPECT_GT(response.elapsed_ms, 0.0);
   }
 
-  static void expectRefusal(const MatchPoints::Response& response, const std::string& naming)
+  void expectRefusal(const MatchPoints::Response& response, const std::string& naming) const override
   {
     expectFailure(response, naming);
     EXPECT_TRUE(std::isnan(response.model_matrix[0]));
@@ -210,39 +209,21 @@ TEST_F(MatchServiceTest, RefusesBadInputAndGoesOn)
   }();
   const std::string large = textFile("large.pgm", "P5\n10000 6000\n255\n");
 
-  struct Case
-  {
-    std::string what;
-    std::function<void(MatchPoints::Request&)> spoil;
-    std::string naming;
-  };
-  const auto query = [](const std::string& path) {
-    return [path](MatchPoints::Request& request) {
-      request.query = ImageSource();
-      request.query.path = path;
-    };
-  };
-  const auto view = [](const std::string& name) {
-    return [name](MatchPoints::Request& request) {
-      request.reference = ImageSource();
-      request.reference.view = name;
-    };
-  };
   const double not_a_number = std::numeric_limits<double>::quiet_NaN();
-  const std::vector<Case> cases = {
-    { "missing file", query("/nowhere/picture.png"), "/nowhere/picture.png" },
-    { "a directory", query(directory_.path().string()), directory_.path().string() },
-    { "not an image", query(textFile("text.png", "hello")), "text.png" },
-    { "empty file", query(textFile("empty.png", "")), "empty.png" },
-    { "cut short", query((directory_.path() / "half.png").string()), "half.png" },
-    { "1x1", query(file("dot.png", cv::Mat(1, 1, CV_8UC1, cv::Scalar(9)))), "dot.png" },
-    { "too large", query(large), "large.pgm" },
-    { "constant", query(file("constant.png", cv::Mat(360, 480, CV_8UC1, cv::Scalar(90)))), "" },
-    { "unrelated", query(file("unrelated.png", texturedPicture(7))), "" },
-    { "mirrored", query(mirrored), "" },
-    { "unknown view", view("nobody"), "nobody" },
-    { "name with ../", view("../wall"), "../wall" },
-    { "name with /", view("a/b"), "a/b" },
+  const std::vector<BadRequest> requests = {
+    { "missing file", fileAsQuery("/nowhere/picture.png"), "/nowhere/picture.png" },
+    { "a directory", fileAsQuery(directory_.path().string()), directory_.path().string() },
+    { "not an image", fileAsQuery(textFile("text.png", "hello")), "text.png" },
+    { "empty file", fileAsQuery(textFile("empty.png", "")), "empty.png" },
+    { "cut short", fileAsQuery((directory_.path() / "half.png").string()), "half.png" },
+    { "1x1", fileAsQuery(file("dot.png", cv::Mat(1, 1, CV_8UC1, cv::Scalar(9)))), "dot.png" },
+    { "too large", fileAsQuery(large), "large.pgm" },
+    { "constant", fileAsQuery(file("constant.png", cv::Mat(360, 480, CV_8UC1, cv::Scalar(90)))), "" },
+    { "unrelated", fileAsQuery(file("unrelated.png", texturedPicture(7))), "" },
+    { "mirrored", fileAsQuery(mirrored), "" },
+    { "unknown view", viewAsReference("nobody"), "nobody" },
+    { "name with ../", viewAsReference("../wall"), "../wall" },
+    { "name with /", viewAsReference("a/b"), "a/b" },
     { "two fields", [&](MatchPoints::Request& request) { request.query.path = good; }, "path and image" },
     { "no field and no camera", [](MatchPoints::Request& request) { request.query = ImageSource(); },
       "/open/image_raw" },
@@ -259,14 +240,7 @@ TEST_F(MatchServiceTest, RefusesBadInputAndGoesOn)
       },
       "query.image" },
   };
-  for (const Case& bad : cases)
-  {
-    SCOPED_TRACE(bad.what);
-    MatchPoints::Request request = goodRequest();
-    request.overlay = true;
-    bad.spoil(request);
-    expectRefusal(call(request), bad.naming);
-  }
+  expectRefusals(requests);
   expectHomography(call(goodRequest()));
 }
 

@@ -5,6 +5,7 @@
 #include "node_test.h"
 #include "support/temporary_directory.h"
 
+#include "view_servo/ImageSource.h"
 #include "view_servo/SetView.h"
 #include "view_servo/views/view_store.h"
 
@@ -15,8 +16,10 @@
 #include <opencv2/core.hpp>
 #include <opencv2/imgcodecs.hpp>
 
+#include <functional>
 #include <set>
 #include <string>
+#include <vector>
 
 namespace view_servo
 {
@@ -29,6 +32,14 @@ class MatcherTest : public ::testing::Test
 protected:
   using Request = typename Service::Request;
   using Response = typename Service::Response;
+
+  /** A request that cannot be answered. */
+  struct BadRequest
+  {
+    std::string what;
+    std::function<void(Request&)> spoil;  ///< makes it of a good one
+    std::string naming;                   ///< what the refusal has to name
+  };
 
   /** @param reference,current two 8-bit pictures that the node can match. */
   MatcherTest(const std::string& node, const cv::Mat& reference, const cv::Mat& current)
@@ -51,6 +62,39 @@ protected:
     request.reference.image = toMono8(picture_);
     request.query.image = toMono8(seen_);
     return request;
+  }
+
+  /** Puts a file in the place of the current picture. */
+  static std::function<void(Request&)> fileAsQuery(const std::string& path)
+  {
+    return [path](Request& request) {
+      request.query = ImageSource();
+      request.query.path = path;
+    };
+  }
+
+  /** Puts a stored view in the place of the reference picture. */
+  static std::function<void(Request&)> viewAsReference(const std::string& name)
+  {
+    return [name](Request& request) {
+      request.reference = ImageSource();
+      request.reference.view = name;
+    };
+  }
+
+  /** Expects an answer without a result, whose message has the words `naming`. */
+  virtual void expectRefusal(const Response& response, const std::string& naming) const = 0;
+
+  void expectRefusals(const std::vector<BadRequest>& requests) const
+  {
+    for (const BadRequest& bad : requests)
+    {
+      SCOPED_TRACE(bad.what);
+      Request request = goodRequest();
+      request.overlay = true;
+      bad.spoil(request);
+      expectRefusal(call(request), bad.naming);
+    }
   }
 
   /** Calls NODE/match. */

@@ -10,7 +10,6 @@
 #include <Eigen/Geometry>
 
 #include <cmath>
-#include <functional>
 #include <set>
 #include <string>
 #include <vector>
@@ -97,7 +96,7 @@ protected:
     EXPECT_TRUE(std::isnan(fields.covariance[0]));
   }
 
-  static void expectRefusal(const MatchScene::Response& response, const std::string& naming)
+  void expectRefusal(const MatchScene::Response& response, const std::string& naming) const override
   {
     expectFailure(response, naming);
     EXPECT_EQ(response.found, "");
@@ -166,39 +165,17 @@ TEST_F(SceneMatcherNodeTest, FindsAPlane)
 
 TEST_F(SceneMatcherNodeTest, RefusesBadInputAndGoesOn)
 {
-  struct Case
-  {
-    std::string what;
-    std::function<void(MatchScene::Request&)> spoil;
-    std::string naming;
-  };
-  const std::vector<Case> cases = {
+  const std::vector<BadRequest> requests = {
     { "model", [](MatchScene::Request& request) { request.model = "affine"; }, "model: 'affine'" },
-    { "missing file",
-      [](MatchScene::Request& request) {
-        request.query = ImageSource();
-        request.query.path = "/nowhere/picture.png";
-      },
-      "/nowhere/picture.png" },
-    { "unknown view",
-      [](MatchScene::Request& request) {
-        request.reference = ImageSource();
-        request.reference.view = "nobody";
-      },
-      "nobody" },
+    { "missing file", fileAsQuery("/nowhere/picture.png"), "/nowhere/picture.png" },
+    { "unknown view", viewAsReference("nobody"), "nobody" },
     { "unrelated", [](MatchScene::Request& request) { request.query.image = toMono8(texturedPicture(9)); },
       "no geometry found" },
     { "constant",
       [](MatchScene::Request& request) { request.query.image = toMono8(cv::Mat(360, 480, CV_8UC1, cv::Scalar(90))); },
       "too few" },
   };
-  for (const Case& bad : cases)
-  {
-    SCOPED_TRACE(bad.what);
-    MatchScene::Request request = goodRequest();
-    bad.spoil(request);
-    expectRefusal(call(request), bad.naming);
-  }
+  expectRefusals(requests);
   EXPECT_TRUE(call(goodRequest()).success);
 }
 
