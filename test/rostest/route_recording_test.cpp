@@ -1,0 +1,77 @@
+// Copyright (c) 2026, the view_servo authors
+// SPDX-License-Identifier: BSD-3-Clause
+
+/** @file A route is recorded while the base is driven. */
+#include "routes_test.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <cstddef>
+#include <string>
+
+namespace view_servo
+{
+namespace test
+{
+namespace
+{
+TEST_F(RoutesTest, RecordsViewsAlongTheWay)
+{
+  recordHall();
+  const Route route = store_->load("hall");
+  ASSERT_GE(route.stops.size(), 5U);
+  EXPECT_NEAR(lengthOf(route), std::hypot(END.x - BEGIN.x, END.y - BEGIN.y), 0.1);
+  for (std::size_t i = 1; i < route.stops.size(); ++i)
+  {
+    const double step = compose(inverse(route.stops[i - 1].base), route.stops[i].base).distance();
+    EXPECT_LE(step, 0.75) << i;
+    EXPECT_GT(route.stops[i].stamp, route.stops[i - 1].stamp);
+  }
+  EXPECT_TRUE(store_->views().load("hall_001").camera);
+  EXPECT_NE(start("hall").find("there is one of that name"), std::string::npos);
+}
+
+TEST_F(RoutesTest, RefusesToRecordWhatCannotBe)
+{
+  EXPECT_EQ(stop(), "refused: no route is recorded: call ~start first");
+  EXPECT_NE(start("../hall").find("a route's name is"), std::string::npos);
+  putAt(BEGIN);
+  EXPECT_EQ(start("short").find("refused"), std::string::npos);
+  EXPECT_NE(start("other").find("route 'short' is, call ~stop first"), std::string::npos);
+  EXPECT_NE(stop().find("the base has not moved"), std::string::npos);
+  EXPECT_FALSE(store_->has("short"));
+  EXPECT_EQ(store_->views().revisions().count("short_001"), 0U) << "no half route";
+}
+
+TEST_F(RoutesTest, LeavesNoHalfRouteWhenTheCameraStops)
+{
+  putAt(BEGIN);
+  camera_ = false;
+  EXPECT_NE(start("dark").find("refused: route 'dark' is not recorded: "), std::string::npos);
+  camera_ = true;
+  ASSERT_TRUE(waitUntil([this] { return start("dark").find("refused") == std::string::npos; }));
+  drive(0.6, 0.0);
+  EXPECT_EQ(store_->views().revisions().count("dark_002"), 1U);
+  camera_ = false;
+  const std::string answer = stop();
+  EXPECT_NE(answer.find("route 'dark' is not stored, and its views are removed: "), std::string::npos) << answer;
+  EXPECT_FALSE(store_->has("dark"));
+  EXPECT_EQ(store_->views().revisions().count("dark_001") + store_->views().revisions().count("dark_002"), 0U);
+}
+
+TEST_F(RoutesTest, SaysWhenTheBaseGoesOnWithoutImages)
+{
+  putAt(BEGIN);
+  ASSERT_EQ(start("gap").find("refused"), std::string::npos);
+  camera_ = false;
+  drive(1.2, 0.0);
+  camera_ = true;
+  const std::string answer = stop();
+  EXPECT_NE(answer.find("without a usable image since view 'gap_001': drive slower"), std::string::npos) << answer;
+  EXPECT_FALSE(store_->has("gap"));
+}
+
+}  // namespace
+}  // namespace test
+}  // namespace view_servo
