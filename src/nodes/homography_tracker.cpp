@@ -22,6 +22,8 @@
 #include "view_servo/ros/view_choice.h"
 #include "view_servo/tracking/plane_finder.h"
 #include "view_servo/tracking/plane_tracker.h"
+#include "view_servo/tracking/scene_finder.h"
+#include "view_servo/tracking/target_tracker.h"
 #include "view_servo/views/view_store.h"
 
 #include <image_transport/image_transport.h>
@@ -45,6 +47,7 @@
 #include <string>
 #include <thread>
 #include <utility>
+#include <variant>
 
 namespace view_servo
 {
@@ -87,6 +90,7 @@ struct Status
   TrackingState state = TrackingState::SEARCHING;
   std::string reason = "no view is followed";
   int points = 0;
+  bool scene = false;  // it is followed as one
 };
 
 std::string nameOf(TrackingState state)
@@ -97,8 +101,9 @@ std::string nameOf(TrackingState state)
 }  // namespace
 
 /**
- * Follows the plane of a stored view through the images of a moving camera, and publishes its homography, the camera's motion
- * from the view and the plane itself. Private parameters: see HomographyTrackerNodeParams.
+ * Follows a stored view, of a plane or of a scene with depth, through the images of a moving camera, and publishes its
+ * homography, the camera's motion from the view and the plane itself, which is a virtual one for a scene. Private
+ * parameters: see HomographyTrackerNodeParams.
  *
  * Subscribes:
  *  - `image_raw`, `camera_info`: see CameraInput; tf;
@@ -122,8 +127,8 @@ std::string nameOf(TrackingState state)
  *  - `~stop` (std_srvs/Trigger).
  *
  * The newest choice of ~start, ~stop and `wanted_view` counts, see ViewChoice. One thread follows and always takes the newest
- * image; another one looks for the view by its points (PlaneFinder), for as long as the plane is not tracked, so that images go
- * on meanwhile.
+ * image; another one looks for the view by its points (PlaneFinder, SceneFinder), for as long as it is not tracked, so
+ * that images go on meanwhile.
  */
 class HomographyTrackerNode : private NodeBase
 {
@@ -357,7 +362,7 @@ private:
         starter_.cameraInOdom(header, [this] { return stopping_.load(); });
     if (const std::optional<PlaneSearcher::Search> search = newSearch())
     {
-      news = startWhere(*search);
+      news = startWhere(task, *search);
     }
     const PlaneTrack& track = session_->add(image, camera_in_odom);
     unfound_.reset();
@@ -368,6 +373,10 @@ private:
       {
         search();
       }
+    }
+    else if (session_->wanted() == TargetTracker::Search::SCENE && searcher_.ready())
+    {
+      beginSearch(image, camera_in_odom);
     }
     publish(task, track, header, news);
     draw(task, header, camera_in_odom);
@@ -382,12 +391,20 @@ private:
   void processAnswer(const Task& task)
   {
     const std::optional<PlaneSearcher::Search> search = newSearch();
-    if (!search || !unfound_)
+    if (!search)
     {
       return;
     }
-    const std::string news = startWhere(*search);
-    const PlaneTrack track = search->answer.h ? session_->add(unfound_->image, unfound_->camera_in_odom) : PlaneTrack();
+    const std::string news = startWhere(task, *search);
+    if (!unfound_)
+    {
+      return;
+    }
+    const auto* plane = std::get_if<PlaneFinder::Answer>(&search->answer);
+    const bool found = plane != nullptr
+                           ? plane->h.has_value()
+                           : std::get<SceneFinder::Answer>(search->answer).kind == SceneFinder::Kind::SCENE;
+    const PlaneTrack track = found ? session_->add(unfound_->image, unfound_->camera_in_odom) : PlaneTrack();
     publish(task, track, unfound_->header, news);
     draw(task, unfound_->header, unfound_->camera_in_odom);
     if (track.state == TrackingState::TRACKING)
@@ -399,8 +416,21 @@ private:
   /** Begins to look for the view in the newest image. */
   void search()
   {
-    searcher_.begin({ era_, session_->question(unfound_->image), unfound_->camera_in_odom, {} });
+    beginSearch(unfound_->image, unfound_->camera_in_odom);
     unfound_->searched = true;
+  }
+
+  /** Begins the search that the session wants. */
+  void beginSearch(const cv::Mat& image, const std::optional<Eigen::Isometry3d>& camera_in_odom)
+  {
+    if (session_->wanted() == TargetTracker::Search::SCENE)
+    {
+      searcher_.begin({ era_, session_->sceneQuestion(image), camera_in_odom, {} });
+    }
+    else
+    {
+      searcher_.begin({ era_, session_->question(image), camera_in_odom, {} });
+    }
   }
 
   /** The search that has finished since the last call, if it is about this session. */
@@ -410,11 +440,36 @@ private:
     return search && search->era == era_ ? std::move(search) : std::nullopt;
   }
 
-  /** Starts the session where a search has found the view. @return the reason if it cannot be tracked then. */
-  std::string startWhere(const PlaneSearcher::Search& search)
+  /**
+   * Starts the session where a search has found the view.
+   * @return the reason if it cannot be tracked then; empty: the reason is the same as before.
+   */
+  std::string startWhere(const Task& task, const PlaneSearcher::Search& search)
   {
-    session_->start(search.answer, search.camera_in_odom);
-    return search.answer.h ? "the view cannot be tracked where it was found" : search.answer.reason;
+    constexpr const char* NOT_TRACKED = "the view cannot be tracked where it was found";
+    if (const auto* plane = std::get_if<PlaneFinder::Answer>(&search.answer))
+    {
+      session_->start(*plane, search.camera_in_odom);
+      return plane->h ? NOT_TRACKED : plane->reason;
+    }
+    const auto& scene = std::get<SceneFinder::Answer>(search.answer);
+    const bool was_scene = session_->followsScene();
+    session_->start(scene, search.camera_in_odom);
+    const bool is_scene = session_->followsScene();
+    if (!was_scene && scene.kind == SceneFinder::Kind::SCENE)
+    {
+      ROS_INFO_STREAM("view '" << task.chosen.view << "' is followed as a scene: it shows depth");
+    }
+    else if (was_scene && !is_scene)
+    {
+      ROS_INFO_STREAM("view '" << task.chosen.view << "' is followed as a plane: " << scene.reason);
+    }
+    if (scene.kind == SceneFinder::Kind::SCENE)
+    {
+      return NOT_TRACKED;
+    }
+    // Where the view may be a plane, what a search for one says counts.
+    return params_.sessions.target == Target::SCENE ? scene.reason : "";
   }
 
   // ----------------------------------------------------------------------------------------------------- publishing
@@ -475,12 +530,14 @@ private:
     }
     const TrackingState before = std::exchange(status_.state, track.state);
     status_.points = track.homography.supporting;
+    status_.scene = session_ && session_->followsScene();
     if (track.state == TrackingState::TRACKING)
     {
       status_.reason.clear();
       if (before != TrackingState::TRACKING)
       {
-        ROS_INFO_STREAM("view '" << task.chosen.view << "' is tracked by " << status_.points << " points");
+        ROS_INFO_STREAM("view '" << task.chosen.view << "' is tracked by " << status_.points << " points"
+                                 << (status_.scene ? " of a scene" : ""));
       }
       return "";
     }
@@ -536,6 +593,7 @@ private:
     status.add("View", chosen.view);
     status.add("Goal", chosen.goal);
     status.add("Points", status_.points);
+    status.add("Followed as", status_.scene ? "scene" : "plane");
     timings_.report(status, "Time an image");
   }
 

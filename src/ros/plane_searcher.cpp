@@ -47,12 +47,24 @@ void PlaneSearcher::work()
 {
   while (std::optional<Search> search = questions_.wait())
   {
-    const std::string fault = guarded("looking for the view", [&] {
-      search->answer = finder_.find(search->question, [this] { return stopping_.load(); });
-    });
-    if (!fault.empty())
+    const auto given_up = [this] {
+      return stopping_.load();
+    };
+    if (const auto* plane = std::get_if<PlaneFinder::Question>(&search->question))
     {
-      search->answer.reason = fault;
+      PlaneFinder::Answer answer;
+      const std::string fault = guarded("looking for the view", [&] { answer = finder_.find(*plane, given_up); });
+      answer.reason = fault.empty() ? answer.reason : fault;
+      search->answer = std::move(answer);
+    }
+    else
+    {
+      SceneFinder::Answer answer;
+      const std::string fault = guarded("looking for the view as a scene", [&] {
+        answer = scene_finder_.find(std::get<SceneFinder::Question>(search->question), given_up);
+      });
+      answer.reason = fault.empty() ? answer.reason : fault;
+      search->answer = std::move(answer);
     }
     answers_.put(std::move(*search));
     on_finished_();

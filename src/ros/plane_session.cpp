@@ -16,12 +16,15 @@
 namespace view_servo
 {
 PlaneSession::PlaneSession(const CachedView& view, const sensor_msgs::CameraInfo& info,
-                           const PlaneTrackerParams& params)
+                           const PlaneTrackerParams& params, Target target)
   : params_(params),
+    target_(target),
+    view_camera_(cameraOf(view.stored, toCamera(info))),
+    camera_(toCamera(info)),
     view_(view.image),
     info_(info),
-    rectification_(toCamera(info), toCamera(info).rectified()),
-    view_warp_(cameraOf(view.stored, toCamera(info)), rectification_.to()),
+    rectification_(camera_, camera_.rectified()),
+    view_warp_(view_camera_, rectification_.to()),
     reference_(view_warp_.image(view_->grey())),
     region_(view_warp_.region(view_->region()))
 {
@@ -34,7 +37,7 @@ PlaneSession::PlaneSession(const CachedView& view, const sensor_msgs::CameraInfo
 
 void PlaneSession::reset()
 {
-  tracker_ = std::make_unique<PlaneTracker>(reference_, region_, rectification_.to().k, params_);
+  tracker_ = std::make_unique<TargetTracker>(reference_, region_, rectification_.to().k, params_, target_);
   last_h_.reset();
   path_.clear();
 }
@@ -65,6 +68,15 @@ PlaneFinder::Question PlaneSession::question(const cv::Mat& raw) const
   return { view_, raw, last_h };
 }
 
+SceneFinder::Question PlaneSession::sceneQuestion(const cv::Mat& raw)
+{
+  if (!scene_view_)
+  {
+    scene_view_ = std::make_shared<const PreparedImage>(view_->grey(), view_->region(), SceneFinder().features());
+  }
+  return { scene_view_, view_camera_, raw, camera_ };
+}
+
 void PlaneSession::start(const PlaneFinder::Answer& answer, const std::optional<Eigen::Isometry3d>& camera_in_odom)
 {
   std::optional<Eigen::Matrix3d> h = answer.h;
@@ -81,10 +93,12 @@ void PlaneSession::start(const PlaneFinder::Answer& answer, const std::optional<
     }
     h = homographyFromPoints(pairs);
   }
-  if (h)
-  {
-    tracker_->start(*h, camera_in_odom);
-  }
+  tracker_->addPlaneSearch(h, camera_in_odom);
+}
+
+void PlaneSession::start(const SceneFinder::Answer& answer, const std::optional<Eigen::Isometry3d>& camera_in_odom)
+{
+  tracker_->addSceneSearch(answer, camera_in_odom);
 }
 
 const PlaneTrack& PlaneSession::add(const cv::Mat& raw, const std::optional<Eigen::Isometry3d>& camera_in_odom)

@@ -29,6 +29,11 @@ std::vector<Parameter> parameters(SessionStarterParams& params)
                "empty: do without"),
           real("tf_patience", params.tf_patience, "s", ">= 0",
                "how long an image waits for tf to know where its camera was; then it is followed without"),
+          choice<Target>(
+              "target", params.target,
+              { { "plane", Target::PLANE }, { "scene", Target::SCENE }, { "auto", Target::AUTO } },
+              "whether views show one plane or a scene, which has things at different depths; auto takes them for "
+              "planes until a search finds depth"),
       },
       parameters(params.tracker),
   });
@@ -67,7 +72,7 @@ SessionStarter::Preparation SessionStarter::prepare(const std::string& view)
     }
     if (preparation.reason.empty())
     {
-      preparation.session = std::make_unique<PlaneSession>(stored, *frame.info, params_.tracker);
+      preparation.session = std::make_unique<PlaneSession>(stored, *frame.info, params_.tracker, params_.target);
     }
   }
   catch (const std::exception& error)

@@ -4,6 +4,7 @@
 
 #include "view_servo/ros/mailbox.h"
 #include "view_servo/tracking/plane_finder.h"
+#include "view_servo/tracking/scene_finder.h"
 
 #include <Eigen/Geometry>
 
@@ -13,26 +14,31 @@
 #include <functional>
 #include <optional>
 #include <thread>
+#include <variant>
 
 namespace view_servo
 {
 /**
- * Searches for the plane of a view in a thread of its own, so that images are still handled meanwhile. There is one
- * search at a time, and a least period between them. All methods are to be called by one and the same thread.
+ * Searches for a view, as a plane or as a scene with depth, in a thread of its own, so that images are still handled
+ * meanwhile. There is one search at a time, and a least period between them. All methods are to be called by one and
+ * the same thread.
  */
 class PlaneSearcher
 {
 public:
   struct Search
   {
-    std::uint64_t era;                                ///< a number of the caller's, by which it tells outdated answers
-    PlaneFinder::Question question;                   ///< the view, and the image in which it is looked for
+    std::uint64_t era;  ///< a number of the caller's, by which it tells outdated answers
+    /** The view, and the image in which it is looked for: of the kind of search that is meant. */
+    std::variant<PlaneFinder::Question, SceneFinder::Question> question;
     std::optional<Eigen::Isometry3d> camera_in_odom;  ///< the camera's pose when the image was taken; empty: not known
-    PlaneFinder::Answer answer;                       ///< set when the search has ended
+    /** Of the same kind; set when the search has ended. */
+    std::variant<PlaneFinder::Answer, SceneFinder::Answer> answer;
   };
 
   /**
-   * @param period least time from the begin of one search to the next [s]. @param finder must outlive this.
+   * @param period least time from the begin of one search to the next [s]. @param finder must outlive this; scenes are
+   * looked for by a SceneFinder with its own parameters.
    * @param on_finished is called by another thread when finished() has an answer.
    */
   PlaneSearcher(const PlaneFinder& finder, double period, std::function<void()> on_finished);
@@ -56,6 +62,7 @@ private:
   void work();
 
   const PlaneFinder& finder_;
+  const SceneFinder scene_finder_;
   const Clock::duration period_;
   const std::function<void()> on_finished_;
   bool searching_ = false;

@@ -7,6 +7,8 @@
 #include "view_servo/ros/node_base.h"
 #include "view_servo/tracking/plane_finder.h"
 #include "view_servo/tracking/plane_tracker.h"
+#include "view_servo/tracking/scene_finder.h"
+#include "view_servo/tracking/target_tracker.h"
 #include "view_servo/views/overlay.h"
 #include "view_servo/views/prepared_image.h"
 #include "view_servo/views/view_cache.h"
@@ -25,18 +27,19 @@
 namespace view_servo
 {
 /**
- * Follows the plane of a stored view through the images of one camera, with one calibration. The view is searched for
- * in images as they come (PlaneFinder) and tracked in rectified ones (PlaneTracker). A view of another camera is
- * tracked as this one would have taken it. Not for several threads at once.
+ * Follows a stored view, a plane or a scene with depth, through the images of one camera, with one calibration. The
+ * view is searched for in images as they come (PlaneFinder, SceneFinder) and tracked in rectified ones (TargetTracker).
+ * A view of another camera is tracked as this one would have taken it. Not for several threads at once.
  */
 class PlaneSession
 {
 public:
   /**
    * @throws std::runtime_error when the view's camera cannot be used (see cameraOf()) or this camera would show
-   * nothing of the view's region, and what CameraWarp and PlaneTracker throw.
+   * nothing of the view's region, and what CameraWarp and TargetTracker throw.
    */
-  PlaneSession(const CachedView& view, const sensor_msgs::CameraInfo& info, const PlaneTrackerParams& params);
+  PlaneSession(const CachedView& view, const sensor_msgs::CameraInfo& info, const PlaneTrackerParams& params,
+               Target target);
 
   /** To be called for each image: whether this one and all before have the calibration that the session began with. */
   bool checkCalibration(const sensor_msgs::CameraInfo& info);
@@ -50,11 +53,29 @@ public:
    */
   PlaneFinder::Question question(const cv::Mat& raw) const;
 
-  /** Starts tracking from where PlaneFinder found the view. @param camera_in_odom when that image was taken. */
+  /** The question to SceneFinder. @param raw as in question(). */
+  SceneFinder::Question sceneQuestion(const cv::Mat& raw);
+
+  /** Which of the two questions should be asked about the last image. */
+  TargetTracker::Search wanted() const
+  {
+    return tracker_->wanted();
+  }
+
+  /** Whether the view is followed as a scene with depth. */
+  bool followsScene() const
+  {
+    return tracker_->followsScene();
+  }
+
+  /** Tracks from where PlaneFinder found the view, if it did. @param camera_in_odom when that image was taken. */
   void start(const PlaneFinder::Answer& answer, const std::optional<Eigen::Isometry3d>& camera_in_odom);
 
+  /** The same with SceneFinder. */
+  void start(const SceneFinder::Answer& answer, const std::optional<Eigen::Isometry3d>& camera_in_odom);
+
   /**
-   * Tracks the plane in the next image.
+   * Tracks the view in the next image.
    * @param raw as in question(). @param camera_in_odom as in PlaneTracker::add().
    */
   const PlaneTrack& add(const cv::Mat& raw, const std::optional<Eigen::Isometry3d>& camera_in_odom);
@@ -70,8 +91,12 @@ private:
   void reset();
 
   PlaneTrackerParams params_;
-  std::shared_ptr<const PreparedImage> view_;  // as the camera took it
-  sensor_msgs::CameraInfo info_;               // what the session began with
+  Target target_;
+  Camera view_camera_;
+  Camera camera_;
+  std::shared_ptr<const PreparedImage> view_;        // as the camera took it
+  std::shared_ptr<const PreparedImage> scene_view_;  // the same for SceneFinder; null until it is asked
+  sensor_msgs::CameraInfo info_;                     // what the session began with
   CameraWarp rectification_;
   CameraWarp view_warp_;  // from the view's camera to the rectified one
   cv::Mat reference_;     // without distortion, as all that follows
@@ -79,7 +104,7 @@ private:
   bool calibration_changed_ = false;
   StampOrder order_;
   cv::Mat last_image_;  // rectified
-  std::unique_ptr<PlaneTracker> tracker_;
+  std::unique_ptr<TargetTracker> tracker_;
   std::optional<Eigen::Matrix3d> last_h_;  // where the plane was tracked last, x_cur ~ H x_ref, rectified [px]
   Points path_;  // where the region's middle, which servo_25d leads, has been [px], newest last
 };

@@ -7,6 +7,7 @@
 #include "view_servo/ros/plane_session.h"
 #include "view_servo/ros/transform_source.h"
 #include "view_servo/tracking/plane_tracker.h"
+#include "view_servo/tracking/target_tracker.h"
 #include "view_servo/views/prepared_image.h"
 #include "view_servo/views/view_cache.h"
 
@@ -28,6 +29,7 @@ struct SessionStarterParams
   std::filesystem::path views_dir;       ///< where stored views are; empty: as viewsDir() says
   std::string odom_frame = "base_link";  ///< frame that does not jump; empty: none
   double tf_patience = 0.05;             ///< longest wait of an image for tf [s]
+  Target target = Target::AUTO;          ///< what views are taken to show
   PlaneTrackerParams tracker;
 };
 
@@ -36,7 +38,7 @@ std::vector<Parameter> parameters(SessionStarterParams& params);
 
 /**
  * Makes a PlaneSession for a view once everything is there that it needs: the stored view, images with a calibration,
- * and tf. Safe to use from several threads. Its parameters are `~views_dir`, `~odom_frame`, `~tf_patience` and those of tracking, see
+ * and tf. Safe to use from several threads. Its parameters are `~views_dir`, `~odom_frame`, `~tf_patience`, `~target` and those of tracking, see
  * parameters(HomographyTrackerNodeParams&).
  */
 class SessionStarter
