@@ -409,7 +409,10 @@ private:
     newest_matches_ = std::fmax(newest_matches_, stamp);
   }
 
-  /** How old the last matches' image may be while the base goes on by them: three periods of their rate after they are due [s]. */
+  /**
+   * How old the last matches' image may be while the base goes on by them: three periods of their rate after they are
+   * due [s].
+   */
   double blindPatience() const
   {
     constexpr double LEAST = 0.4;
@@ -424,7 +427,9 @@ private:
            scale_variance_ <= MOST_DOUBT * MOST_DOUBT;
   }
 
-  /** A base that cannot slide stands to look: what is seen from one place is averaged. @param view in odometry's frame. */
+  /**
+   * A base that cannot slide stands to look: what is seen from one place is averaged. @param view in odometry's frame.
+   */
   PlanarPose averageAtRest(const PlanarPose& base_in_odom, const PlanarPose& view)
   {
     constexpr double AT_REST = 0.001;  // [m, rad]
@@ -443,7 +448,9 @@ private:
              wrapAngle(mean.yaw + part * wrapAngle(view.yaw - mean.yaw)) };
   }
 
-  /** The covariance of where the view is: that of its pose in the camera, and of the scale that odometry has given it. */
+  /**
+   * The covariance of where the view is: that of its pose in the camera, and of the scale that odometry has given it.
+   */
   Eigen::Matrix3d inOdometry(const ViewTracker::Result& result, double camera_yaw) const
   {
     constexpr double LEAST_DOUBT = 0.05;  // wheels measure distances by some per cent wrong
@@ -454,7 +461,9 @@ private:
     return turned * (metres * result.covariance * metres + along * along.transpose()) * turned.transpose();
   }
 
-  /** Whether a base that cannot slide goes on by odometry: its way may lead over where little of the view is in sight. */
+  /**
+   * Whether a base that cannot slide goes on by odometry: its way may lead over where little of the view is in sight.
+   */
   bool mayGoOn() const
   {
     const ManoeuvreParams& limits = params_.approach.manoeuvre;

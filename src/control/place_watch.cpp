@@ -10,7 +10,10 @@ namespace view_servo
 {
 namespace
 {
-/** How far a motion that is seen goes along one that is known, as a part of the latter; neither has to be exact in length. */
+/**
+ * How far a motion that is seen goes along one that is known, as a part of the latter; neither has to be exact in
+ * length.
+ */
 double alongPart(const Eigen::Vector3d& known, const Eigen::Vector3d& seen)
 {
   return seen.dot(known) / known.squaredNorm();

@@ -128,8 +128,8 @@ Eigen::Vector2d Servo25d::gainsAt(const Eigen::Vector2d& pixel) const
   Eigen::Vector2d gains;
   for (int i = 0; i < 2; ++i)
   {
-    // Of the image's size: how far inside the margin the point is. The gain rises over as much as the margin is wide, less
-    // where the chosen point's own place is nearer to it, where nothing may hold the camera back.
+    // Of the image's size: how far inside the margin the point is. The gain rises over as much as the margin is wide,
+    // less where the chosen point's own place is nearer to it, where nothing may hold the camera back.
     const auto inside = [&](double at) {
       return std::min(at, target_.size(i) - 1.0 - at) / target_.size(i) - params_.margin;
     };

@@ -21,8 +21,9 @@ constexpr Repetition ARM_RUNS{ "runs from each start", 20, 2, 1 };
 void runArmExperiment(const ExperimentContext& context, std::ostream& csv);
 
 /**
- * The same with two views of scenes that have depth, which are followed as such; a search takes 0.6 s instead of 0.3. What
- * says that it has converged and is more than 2 mm or 0.2 degrees off is wrong, of planes more than 5 mm or 0.5 degrees.
+ * The same with two views of scenes that have depth, which are followed as such; a search takes 0.6 s instead of 0.3.
+ * What says that it has converged and is more than 2 mm or 0.2 degrees off is wrong, of planes more than 5 mm or 0.5
+ * degrees.
  */
 void runArmSceneExperiment(const ExperimentContext& context, std::ostream& csv);
 

@@ -5,8 +5,8 @@
  * Runs the thesis' experiments on this implementation: `experiments NAME [--out DIR]` writes NAME.csv, and NAME.png
  * beside it, drawn by plot_experiment. `--list` names the experiments, what each of them repeats, how often, and from
  * which seed. Those that need real images read them from VIEW_SERVO_DATA. Exit status: 0 table and plot are there, 1
- * only the table is, 2 neither. `campaign` and `soak` are programs of their own, which run simulated robots with their nodes
- * and say themselves how that ended.
+ * only the table is, 2 neither. `campaign` and `soak` are programs of their own, which run simulated robots with their
+ * nodes and say themselves how that ended.
  */
 #include "experiments/arm_experiments.h"
 #include "experiments/arm_geometry_experiment.h"

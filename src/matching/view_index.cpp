@@ -254,8 +254,8 @@ bool ViewIndex::remove(const std::string& name)
 }
 
 /**
- * What the features of one query find. In a large index nearly all of the time is spent on waiting for memory. So the ways
- * of several words through the tree alternate, and what each reads next is fetched meanwhile.
+ * What the features of one query find. In a large index nearly all of the time is spent on waiting for memory. So the
+ * ways of several words through the tree alternate, and what each reads next is fetched meanwhile.
  */
 class ViewIndex::Search
 {

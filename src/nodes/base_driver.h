@@ -9,7 +9,9 @@
 
 namespace view_servo
 {
-/** The part of a driver of a mobile base that its ViewHoming answers for it. What each member is for, DriverNode says. */
+/**
+ * The part of a driver of a mobile base that its ViewHoming answers for it. What each member is for, DriverNode says.
+ */
 class BaseDriver
 {
 public:

@@ -110,25 +110,25 @@ std::string nameOf(TrackingState state)
  *  - `wanted_view` (view_servo/WantedView): the view that a driver wants followed; an empty one ends that.
  *
  * Publishes:
- *  - `~homography` (view_servo/Homography): for each image, with its header, and once more when a search finds the view in the
- *    newest image, in which it was not tracked. Pixels are those of the images as they come, or,
- *    when camera_info has distortion, of rectified ones, with P's K. While images, calibration or tf are lacking, twice a
- *    second, stamped now, with the reason. What cannot be followed (no such view, damaged, of another size than the images,
- *    the camera is not calibrated, or not any more as when it began) is refused, likewise;
- *  - `~overlay` (sensor_msgs/Image, bgr8): the view's outline and points, and the path of its middle; drawn when somebody
- *    listens;
- *  - `~markers` (visualization_msgs/MarkerArray, latched): plane, view, camera and ways, see markers.h; of each image while
- *    somebody listens, deleted when another view or none is chosen;
+ *  - `~homography` (view_servo/Homography): for each image, with its header, and once more when a search finds the view
+ *    in the newest image, in which it was not tracked. Pixels are those of the images as they come, or,
+ *    when camera_info has distortion, of rectified ones, with P's K. While images, calibration or tf are lacking, twice
+ *    a second, stamped now, with the reason. What cannot be followed (no such view, damaged, of another size than the
+ *    images, the camera is not calibrated, or not any more as when it began) is refused, likewise;
+ *  - `~overlay` (sensor_msgs/Image, bgr8): the view's outline and points, and the path of its middle; drawn when
+ *    somebody listens;
+ *  - `~markers` (visualization_msgs/MarkerArray, latched): plane, view, camera and ways, see markers.h; of each image
+ *    while somebody listens, deleted when another view or none is chosen;
  *  - `/diagnostics` (diagnostic_msgs/DiagnosticArray): 1 Hz, camera and tracking.
  *
  * Services:
- *  - `~start` (view_servo/SetView): follows a view from now on, or as soon as image, calibration and tf are there. What cannot
- *    be followed is refused, and what was followed before goes on;
+ *  - `~start` (view_servo/SetView): follows a view from now on, or as soon as image, calibration and tf are there. What
+ *    cannot be followed is refused, and what was followed before goes on;
  *  - `~stop` (std_srvs/Trigger).
  *
- * The newest choice of ~start, ~stop and `wanted_view` counts, see ViewChoice. One thread follows and always takes the newest
- * image; another one looks for the view by its points (PlaneFinder, SceneFinder), for as long as it is not tracked, so
- * that images go on meanwhile.
+ * The newest choice of ~start, ~stop and `wanted_view` counts, see ViewChoice. One thread follows and always takes the
+ * newest image; another one looks for the view by its points (PlaneFinder, SceneFinder), for as long as it is not
+ * tracked, so that images go on meanwhile.
  */
 class HomographyTrackerNode : private NodeBase
 {
@@ -385,8 +385,8 @@ private:
   }
 
   /**
-   * Looks where a search has found the view in the newest image, which has been looked at in vain: the next one may be far
-   * away, in time and in what it shows.
+   * Looks where a search has found the view in the newest image, which has been looked at in vain: the next one may be
+   * far away, in time and in what it shows.
    */
   void processAnswer(const Task& task)
   {

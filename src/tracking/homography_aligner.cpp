@@ -95,12 +95,15 @@ private:
                               int coarsest) const;
   /**
    * Improves h in one level of the pyramids.
-   * @param verified that RANSAC agreed with h in a coarser level. @param result what is counted, and the points of level 0.
+   * @param verified that RANSAC agreed with h in a coarser level. @param result what is counted, and the points of
+   * level 0.
    * @return whether h can be relied on; if not, it says nothing any more.
    */
   bool trackLevel(const cv::Mat& current, std::size_t level, bool verified, Eigen::Matrix3d& h,
                   TrackedHomography& result) const;
-  /** Sets h to what most corners agree with, and the corners' shifts to those that it leaves; false when too few agree. */
+  /**
+   * Sets h to what most corners agree with, and the corners' shifts to those that it leaves; false when too few agree.
+   */
   bool verify(std::vector<FoundCorner>& corners, Eigen::Matrix3d& h) const;
   std::vector<FoundCorner> alignAll(const cv::Mat& current, std::size_t level, const Eigen::Matrix3d& h, int iterations,
                                     int& looked_for) const;

@@ -25,7 +25,8 @@ class RegionRefiner
 public:
   /**
    * @param reference 8-bit, one channel. @param region inside it that shows the plane [px].
-   * @param min_correlation least correlation of a block with what is seen in its place for the block to count, in [0, 1).
+   * @param min_correlation least correlation of a block with what is seen in its place for the block to count, in [0,
+   * 1).
    */
   RegionRefiner(const cv::Mat& reference, const cv::Rect& region, double min_correlation);
 

@@ -31,8 +31,8 @@ struct ArmConditions
   double hand_eye_translation_error = 0.0;  ///< how far the camera's true place on the hand is from the URDF's [m]
   double hand_eye_rotation_error = 0.0;     ///< angle between its true orientation and the URDF's [rad]
   /**
-   * Where a calibration has the camera, in the optical frame of the arm's description. Tracking and servoing take it for the
-   * camera's frame; empty: they take the description's.
+   * Where a calibration has the camera, in the optical frame of the arm's description. Tracking and servoing take it
+   * for the camera's frame; empty: they take the description's.
    */
   std::optional<Eigen::Isometry3d> calibrated_camera;
   double focal_length_error = 0.0;  ///< part by which the calibration's focal lengths are too long

@@ -48,7 +48,10 @@ std::optional<std::string> readFile(const fs::path& path)
   return readStoredFile(path, LARGEST);
 }
 
-/** Whether a file is one that a view of this name had, or that was on its way to become one: all others are somebody else's. */
+/**
+ * Whether a file is one that a view of this name had, or that was on its way to become one: all others are somebody
+ * else's.
+ */
 bool isFileOf(const std::string& name, std::string file)
 {
   constexpr std::string_view TEMPORARY = ".tmp";
@@ -251,7 +254,9 @@ StoredView fieldsFromYaml(const YAML::Node& node)
   return view;
 }
 
-/** @throws Damage, or the error of the library that could not make sense of a file; empty when there is no such view. */
+/**
+ * @throws Damage, or the error of the library that could not make sense of a file; empty when there is no such view.
+ */
 std::optional<StoredView> readView(const fs::path& directory, const std::string& name)
 {
   std::optional<std::string> text = readFile(yamlPath(directory, name));

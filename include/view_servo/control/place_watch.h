@@ -40,22 +40,25 @@ public:
   void add(const Eigen::Isometry3d& camera, const Eigen::Isometry3d& view_in_camera, double unit);
 
   /**
-   * What view_in_camera is measured by has changed, so that motions cannot be compared across it. Call it before the next
-   * sight.
+   * What view_in_camera is measured by has changed, so that motions cannot be compared across it. Call it before the
+   * next sight.
    * @param place pose of the view's camera as it was believed to be, in the frame of `camera` [m].
    */
   void restart(const Eigen::Isometry3d& place);
 
   /**
-   * Whether the view may be taken for reached. False from the moment when its place jumps, or when it does not move as the
-   * camera does, until the camera has moved before it and it does. True before the first sight: a camera may be at the view.
+   * Whether the view may be taken for reached. False from the moment when its place jumps, or when it does not move as
+   * the camera does, until the camera has moved before it and it does. True before the first sight: a camera may be at
+   * the view.
    */
   bool trusted() const
   {
     return trusted_;
   }
 
-  /** Whether the camera has moved by `doubt` or `doubt_turn` while the view was seen to stay, or to move the other way. */
+  /**
+   * Whether the camera has moved by `doubt` or `doubt_turn` while the view was seen to stay, or to move the other way.
+   */
   bool contradicted() const
   {
     return contradicted_;

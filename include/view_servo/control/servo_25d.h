@@ -63,8 +63,8 @@ struct Servo25dError
   Eigen::Vector2d point = Eigen::Vector2d::Zero();  ///< (x - x*, y - y*) of the chosen point, in normalised coordinates
   double depth = 0.0;  ///< log(Z / Z*) of the chosen point: its depth now over that in the stored view
   /**
-   * θu: axis times angle of the rotation that turns the camera from where the view was stored to where it is now [rad]. The
-   * axis has the same coordinates in the optical frames of both.
+   * θu: axis times angle of the rotation that turns the camera from where the view was stored to where it is now [rad].
+   * The axis has the same coordinates in the optical frames of both.
    */
   Eigen::Vector3d rotation = Eigen::Vector3d::Zero();
 };
@@ -117,8 +117,8 @@ Progress toProgress(const ServoReport& report);
  * border, in x or in y, the slower the camera turns and changes the depth, while the point is led back as fast as ever.
  * So the point turns back at the margin, whatever the distance.
  *
- * A view that does not move as the commands move the camera, as a picture of it held before the camera, is not believed:
- * the camera stands, and servoing gives up after params.lost_timeout.
+ * A view that does not move as the commands move the camera, as a picture of it held before the camera, is not
+ * believed: the camera stands, and servoing gives up after params.lost_timeout.
  *
  * When an image has been evaluated, the camera has already moved on by the commands since. This motion is fed forward,
  * so that errors decay as commanded.
@@ -146,7 +146,9 @@ public:
    */
   void addLoss(double stamp, const std::string& reason);
 
-  /** Sets gain and near_gain of the parameters anew. @throws std::invalid_argument with all faults; nothing is set then. */
+  /**
+   * Sets gain and near_gain of the parameters anew. @throws std::invalid_argument with all faults; nothing is set then.
+   */
   void setGains(double gain, double near_gain);
 
   /** Tells which twist was sent to the camera. @param time from which on the camera follows it [s]. */

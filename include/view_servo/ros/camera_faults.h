@@ -85,7 +85,8 @@ private:
 std::string faultOf(const CameraImage& image, const sensor_msgs::CameraInfo& info, const CameraTopics& topics);
 
 /**
- * What is wrong with an image's age. One from the future is as bad as an old one: time jumped back, as when a bag loops.
+ * What is wrong with an image's age. One from the future is as bad as an old one: time jumped back, as when a bag
+ * loops.
  * @param topic of the image. @param max_age as `~max_image_age` [s].
  */
 std::string faultOfAge(const ros::Time& stamp, const std::string& topic, double max_age);

@@ -52,7 +52,9 @@ constexpr LiveSpan LIVE_RATE{ 0.01, 4.0 };
 std::vector<LiveNumber> aroundNow(const std::vector<Parameter>& table, const std::vector<std::string>& names,
                                   const LiveSpan& span);
 
-/** Sets the parameters in a table that are called as the numbers are. @throws std::invalid_argument for unknown names. */
+/**
+ * Sets the parameters in a table that are called as the numbers are. @throws std::invalid_argument for unknown names.
+ */
 void setNumbers(const std::vector<Parameter>& table, const std::vector<LiveNumber>& numbers);
 
 /** Numbers that are checked and taken over together. */
@@ -94,8 +96,8 @@ LiveGroup liveGroup(const Params& params, std::vector<LiveNumber> numbers, std::
 /**
  * Lets people change numbers of a node while it runs, by rqt_reconfigure and the other clients of dynamic_reconfigure.
  * Values beyond the limits become the nearest that is allowed; unknown names and values that are no numbers change
- * nothing, and values that do not go together leave their group as it is; all that is logged. The parameter server keeps
- * the values that the node was started with.
+ * nothing, and values that do not go together leave their group as it is; all that is logged. The parameter server
+ * keeps the values that the node was started with.
  *
  * Publishes, latched: `~parameter_descriptions` (dynamic_reconfigure/ConfigDescription), `~parameter_updates`
  * (dynamic_reconfigure/Config). Service: `~set_parameters` (dynamic_reconfigure/Reconfigure), whose response is what is

@@ -38,8 +38,8 @@ std::vector<Parameter> parameters(SessionStarterParams& params);
 
 /**
  * Makes a PlaneSession for a view once everything is there that it needs: the stored view, images with a calibration,
- * and tf. Safe to use from several threads. Its parameters are `~views_dir`, `~odom_frame`, `~tf_patience`, `~target` and those of tracking, see
- * parameters(HomographyTrackerNodeParams&).
+ * and tf. Safe to use from several threads. Its parameters are `~views_dir`, `~odom_frame`, `~tf_patience`, `~target`
+ * and those of tracking, see parameters(HomographyTrackerNodeParams&).
  */
 class SessionStarter
 {
