@@ -2,8 +2,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 
 /** @file A matcher matches the images of a camera with the view that somebody chose. */
-#include "change_parameters.h"
 #include "streaming_test.h"
+#include "change_parameters.h"
 #include "support/text_file.h"
 
 #include "view_servo/DeleteView.h"

@@ -91,8 +91,8 @@ public:
   }
 
   /**
-   * Makes the timeout longer for an input that comes slowly: to this many of its usual periods, where that is more than the
-   * timeout; periods above 0.5 s count as 0.5 s.
+   * Makes the timeout longer for an input that comes slowly: to this many of its usual periods, where that is more than
+   * the timeout; periods above 0.5 s count as 0.5 s.
    */
   void followPace(double periods)
   {
@@ -106,8 +106,8 @@ public:
   }
 
   /**
-   * Sets by how much stamps may differ from ROS' time, in the past or in the future [s]. Without a call they may be as old
-   * as they like, and up to 600 s in the future.
+   * Sets by how much stamps may differ from ROS' time, in the past or in the future [s]. Without a call they may be as
+   * old as they like, and up to 600 s in the future.
    */
   void setMaxAge(double age)
   {
@@ -176,14 +176,17 @@ public:
   {
     return "'" + resolved(name) + "'";
   }
+  /** Of the node: topics and services have names relative to its namespace. */
   ros::NodeHandle& nodeHandle()
   {
     return nh_;
   }
+  /** Of the node's parameters, and of names that begin with `~`. */
   const ros::NodeHandle& privateNodeHandle() const
   {
     return private_nh_;
   }
+  /** What a driver adds to here is published on `/diagnostics` once a second. */
   diagnostic_updater::Updater& diagnostics()
   {
     return diagnostics_;

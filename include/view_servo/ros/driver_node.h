@@ -237,7 +237,10 @@ private:
     }
   }
 
-  /** Makes a goal the present one, which must not exist yet, and has it prepared; ends it at once when the gate is closed. */
+  /**
+   * Makes a goal the present one, which must not exist yet, and has it prepared; ends it at once when the gate is
+   * closed.
+   */
   void accept(Handle handle)
   {
     handle.setAccepted();
@@ -364,7 +367,9 @@ private:
 
   // ------------------------------------------------------------------------------------------------------- control
 
-  /** One cycle of control: takes goals and cancellations, judges the present goal, and sends a command where one is due. */
+  /**
+   * One cycle of control: takes goals and cancellations, judges the present goal, and sends a command where one is due.
+   */
   void cycle()
   {
     const ros::Time now = ros::Time::now();

@@ -87,8 +87,8 @@ struct MatchLabel
 
 /**
  * A node that matches images: two given ones on request, and, when a view is chosen, each camera image with that stored
- * view. Parameters, all private: those of parameters(StreamingMatcherParams&), with the rate Matching::RATE by default, and
- * those of Matching.
+ * view. Parameters, all private: those of parameters(StreamingMatcherParams&), with the rate Matching::RATE by default,
+ * and those of Matching.
  *
  * Subscribes:
  *  - `image_raw` (sensor_msgs/Image), `camera_info` (sensor_msgs/CameraInfo);

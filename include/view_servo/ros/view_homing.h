@@ -41,7 +41,8 @@ namespace view_servo
  *
  * Subscribes `image_raw`, `camera_info` (see CameraInput), `point_matches` (view_servo/PointMatches), `line_matches`
  * (view_servo/LineMatches), `odom` (nav_msgs/Odometry) and tf; publishes what BaseOutput does, and `~markers`
- * (visualization_msgs/MarkerArray, latched), see markers.h: of each image while somebody subscribes; deleted with the task.
+ * (visualization_msgs/MarkerArray, latched), see markers.h: of each image while somebody subscribes; deleted with the
+ * task.
  *
  * Of the parameters, `gain` and `turn_gain` may be changed while the node runs, and `distance_tolerance` and
  * `yaw_tolerance`, which count from the next task on; see LiveParameters.
@@ -96,7 +97,9 @@ public:
   void expectView(const std::string& view, const std::string& goal);
   /** Replaces the task, and forgets all that belongs to the old one; null: no task. */
   void setTask(std::shared_ptr<HomingTask> task);
-  /** Sets whether the base may move without matches although the view's points are not tracked; setTask() sets false. */
+  /**
+   * Sets whether the base may move without matches although the view's points are not tracked; setTask() sets false.
+   */
   void setDoesWithoutMatches(bool does);
   /** Makes travelled() zero, and forgets the way driven. */
   void restartWay()
@@ -126,7 +129,9 @@ public:
     return travelled_;
   }
 
-  /** The velocity along a course, by the newest odometry. Zero while stamps of images and odometry are too far apart. */
+  /**
+   * The velocity along a course, by the newest odometry. Zero while stamps of images and odometry are too far apart.
+   */
   BaseVelocity follow(const Course& course) const;
   /** The same along the course of homing. */
   BaseVelocity velocity() const
