@@ -17,7 +17,9 @@
 #include <Eigen/Core>
 #include <opencv2/core.hpp>
 
+#include <algorithm>
 #include <atomic>
+#include <cmath>
 #include <limits>
 #include <mutex>
 #include <string>
@@ -31,7 +33,7 @@ inline const cv::Rect REGION(100, 80, 301, 201);
 inline constexpr char CAMERA_FRAME[] = "camera_optical_frame";
 inline constexpr char FIRST_VIEW[] = "approach";  // of a list; the other one is "goal"
 
-/** An arm that stands still, whatever it is told, with a camera and a tracker. */
+/** An arm that moves a sixth as fast to the side as it is told, and not otherwise, with a camera and a tracker. */
 class FakeArm : public FakeRobot
 {
 public:
@@ -51,11 +53,17 @@ public:
     infos_ = nh_.advertise<sensor_msgs::CameraInfo>("camera_info", 5);
     joints_ = nh_.advertise<sensor_msgs::JointState>("joint_states", 5);
     reconnect();
-    start(30.0, [this](int /*cycle*/) { publish(); });
+    start(RATE, [this](int /*cycle*/) { publish(); });
   }
   ~FakeArm() override
   {
     stop();
+  }
+
+  void obey(const CommandsOf<Command>& commands)
+  {
+    const std::lock_guard<std::mutex> lock(publisher_mutex_);
+    commands_ = &commands;
   }
 
   /** The tracker goes, with all its connections, and comes back. */
@@ -119,6 +127,7 @@ private:
   {
     const std_msgs::Header now = header(stamp());
     const std::lock_guard<std::mutex> lock(publisher_mutex_);
+    moveOn();
     if (camera)
     {
       infos_.publish(info(now));
@@ -185,7 +194,7 @@ private:
     {
       PlaneEstimate plane;
       plane.motion.rotation.setIdentity();
-      plane.motion.translation_over_distance = Eigen::Vector3d(offset / DISTANCE, 0.0, 0.0);
+      plane.motion.translation_over_distance = Eigen::Vector3d(offset_seen_ / DISTANCE, 0.0, 0.0);
       plane.motion.normal = Eigen::Vector3d::UnitZ();
       plane.normal_known = true;
       plane.distance = DISTANCE;
@@ -203,7 +212,33 @@ private:
     return message;
   }
 
+  /** Follows the commands, and `offset` where a test has changed it, no faster than an arm moves. */
+  void moveOn()
+  {
+    constexpr double SHARE = 0.15;    // of what it is told
+    constexpr double FASTEST = 2e-3;  // change in a cycle [m]
+    constexpr double NEAR = 2e-3;     // from where on it stays [m]
+    if (offset != offset_told_)
+    {
+      offset_told_ = offset;
+      offset_left_ = offset_told_ - offset_seen_;
+    }
+    const double step = std::clamp(offset_left_, -FASTEST, FASTEST);
+    offset_left_ -= step;
+    offset_seen_ += step;
+    if (commands_ != nullptr && offset_left_ == 0.0 && std::abs(offset_seen_) > NEAR)
+    {
+      offset_seen_ -= SHARE * commands_->newest().twist.linear.x / RATE;
+    }
+  }
+
+  static constexpr double RATE = 30.0;  // [Hz]
+
   std::mutex publisher_mutex_;
+  const CommandsOf<Command>* commands_ = nullptr;
+  double offset_told_ = 0.1;  // the last value of `offset` [m]
+  double offset_left_ = 0.0;  // how far it has still to be followed [m]
+  double offset_seen_ = 0.1;  // [m]
   ros::Publisher homographies_;
   ros::Publisher infos_;
   ros::Publisher joints_;

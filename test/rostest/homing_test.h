@@ -14,12 +14,14 @@
 #include "view_servo/HomeToViewAction.h"
 #include "view_servo/LineMatches.h"
 #include "view_servo/PointMatches.h"
+#include "view_servo/geometry/planar_motion.h"
 #include "view_servo/geometry/planar_pose.h"
 
 #include <geometry_msgs/Twist.h>
 #include <tf2_ros/static_transform_broadcaster.h>
 
 #include <atomic>
+#include <memory>
 #include <mutex>
 #include <string>
 #include <vector>
@@ -55,7 +57,10 @@ inline const Scene& scene()
   return made;
 }
 
-/** A base on a stand, with a camera and a matcher: its wheels turn as they are told, what it sees does not change. */
+/**
+ * A base, with a camera and a matcher, whose wheels turn as they are told. What it sees changes as if it drove a fifth as
+ * fast as its wheels turn, so that it does not arrive while a test looks on.
+ */
 class FakeBase : public FakeRobot
 {
 public:
@@ -175,6 +180,30 @@ public:
 private:
   static constexpr double RATE = 50.0;  // of odometry [Hz]
 
+  /** Where the camera sees the view from. */
+  PlanarPose seenFrom() const
+  {
+    constexpr double WAY = 0.2;   // of what the wheels make
+    constexpr double TURN = 0.6;  // of what they turn
+    const PlanarPose driven = compose(inverse(scene().base), base_);
+    return compose(scene().base, { WAY * driven.x, WAY * driven.y, TURN * driven.yaw });
+  }
+
+  /** What the camera sees; in the thread that publishes. */
+  cv::Mat picture()
+  {
+    if (base_.x == scene().base.x && base_.y == scene().base.y && base_.yaw == scene().base.yaw)
+    {
+      return scene().image;
+    }
+    if (!renderer_)
+    {
+      renderer_ = std::make_unique<sim::SimulatedCamera>(scene().world, std::vector<std::string>(), 1);
+    }
+    const PlanarPose seen_from = seenFrom();
+    return renderer_->capture(sim::planarPose(seen_from.x, seen_from.y, seen_from.yaw) * scene().world.camera_on_base);
+  }
+
   void publish(int cycle)
   {
     constexpr int IMAGE_EVERY = 5;
@@ -201,7 +230,7 @@ private:
     info.header.frame_id = camera_frame_;
     if (camera)
     {
-      cv::Mat image = black ? cv::Mat(scene().image.size(), CV_8UC1, cv::Scalar(0)) : scene().image;
+      cv::Mat image = black ? cv::Mat(scene().image.size(), CV_8UC1, cv::Scalar(0)) : picture();
       if (elsewhere_)
       {
         image = texturedPicture(7, image.size());
@@ -233,7 +262,29 @@ private:
     PointMatches message;
     message.header = header;
     message.view = wantedView().view;
-    message.matches = black ? std::vector<PointMatch>() : scene().matches;
+    if (black)
+    {
+      return message;
+    }
+    // Where the points that were matched at first are to be seen from where the camera is now.
+    const CameraMount mount(scene().world.camera_on_base);
+    const Camera& camera = scene().world.camera;
+    const PlanarPose at_first = mount.ofCamera(inverse(scene().base));
+    const PlanarPose now = mount.ofCamera(inverse(seenFrom()));
+    for (PointMatch match : scene().matches)
+    {
+      const Correspondence pair{ mount.level(camera.normalized({ match.reference_x, match.reference_y })),
+                                 mount.level(camera.normalized({ match.current_x, match.current_y })) };
+      const Eigen::Vector2d seen = project({ pair.reference, inverseDepth(pair, at_first).value }, now);
+      const Eigen::Vector2d moved = seen - project({ pair.reference, inverseDepth(pair, at_first).value }, at_first);
+      const Eigen::Vector2d pixel = camera.project(mount.unlevel(pair.current + moved).homogeneous());
+      if (pixel.allFinite())
+      {
+        match.current_x = pixel.x();
+        match.current_y = pixel.y();
+        message.matches.push_back(match);
+      }
+    }
     return message;
   }
 
@@ -249,6 +300,7 @@ private:
 
   std::mutex publisher_mutex_;
   const CommandsOf<Command>* commands_ = nullptr;
+  std::unique_ptr<sim::SimulatedCamera> renderer_;
   PlanarPose base_ = scene().base;        // by odometry
   std::atomic<bool> elsewhere_{ false };  // the camera sees something else
   std::string odometry_child_ = sim::BASE_FRAME;
