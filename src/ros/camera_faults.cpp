@@ -47,19 +47,26 @@ std::string faultOf(const CameraTraffic& traffic, const CameraTopics& topics)
   return "";
 }
 
-std::optional<CameraTraffic> PairingWatch::addImage(double time, const ros::Time& stamp)
+bool PairingWatch::Alone::add(double time)
 {
   // A calibration may come after its image. What waits while a frame is worked on comes all at once, and images first.
   constexpr int OFTEN = 5;
+  since = count == 0 ? time : since;
+  ++count;
+  return count >= OFTEN && time - since >= LONG;
+}
+
+std::optional<CameraTraffic> PairingWatch::addImage(double time, const ros::Time& stamp)
+{
   image_stamp_ = stamp;
-  alone_since_ = images_alone_ == 0 ? time : alone_since_;
-  ++images_alone_;
+  infos_alone_.count = 0;
   both_since_ = images_ == 0 && infos_ > 0 ? time : both_since_;
   ++images_;
-  if (images_alone_ >= OFTEN && time - alone_since_ >= LONG)
+  if (images_alone_.add(time))
   {
+    infos_ = 0;  // those that came before have no part in this
     CameraTraffic traffic;
-    traffic.images = images_alone_;
+    traffic.images = images_alone_.count;
     return traffic;
   }
   return unpaired(time);
@@ -68,9 +75,13 @@ std::optional<CameraTraffic> PairingWatch::addImage(double time, const ros::Time
 std::optional<CameraTraffic> PairingWatch::addInfo(double time, const ros::Time& stamp)
 {
   info_stamp_ = stamp;
-  images_alone_ = 0;
+  images_alone_.count = 0;
   both_since_ = infos_ == 0 && images_ > 0 ? time : both_since_;
   ++infos_;
+  if (infos_alone_.add(time))
+  {
+    images_ = 0;
+  }
   return unpaired(time);
 }
 

@@ -172,6 +172,17 @@ TEST(PairingWatch, SaysNothingOfCameraInfoAlone)
   EXPECT_LT(camera.play(5.0), 0.0) << camera.fault;
 }
 
+TEST(PairingWatch, DoesNotCountImagesThatHaveCeased)
+{
+  FakeCamera camera;
+  camera.infos = false;
+  camera.play(1.0);
+  camera.images = false;
+  camera.infos = true;
+  camera.play(1.0);
+  EXPECT_LT(camera.play(3.0), 0.0) << camera.fault;
+}
+
 TEST(CameraTraffic, SaysNothingOfStampsThatAreNotKnown)
 {
   EXPECT_EQ(faultOf(CameraTraffic{ 20, 19, 0, 5.0 }, { "/a", "/b" }),

@@ -268,16 +268,16 @@ private:
     }
     // Where the points that were matched at first are to be seen from where the camera is now.
     const CameraMount mount(scene().world.camera_on_base);
-    const Camera& camera = scene().world.camera;
+    const Camera& lens = scene().world.camera;
     const PlanarPose at_first = mount.ofCamera(inverse(scene().base));
     const PlanarPose now = mount.ofCamera(inverse(seenFrom()));
     for (PointMatch match : scene().matches)
     {
-      const Correspondence pair{ mount.level(camera.normalized({ match.reference_x, match.reference_y })),
-                                 mount.level(camera.normalized({ match.current_x, match.current_y })) };
+      const Correspondence pair{ mount.level(lens.normalized({ match.reference_x, match.reference_y })),
+                                 mount.level(lens.normalized({ match.current_x, match.current_y })) };
       const Eigen::Vector2d seen = project({ pair.reference, inverseDepth(pair, at_first).value }, now);
       const Eigen::Vector2d moved = seen - project({ pair.reference, inverseDepth(pair, at_first).value }, at_first);
-      const Eigen::Vector2d pixel = camera.project(mount.unlevel(pair.current + moved).homogeneous());
+      const Eigen::Vector2d pixel = lens.project(mount.unlevel(pair.current + moved).homogeneous());
       if (pixel.allFinite())
       {
         match.current_x = pixel.x();

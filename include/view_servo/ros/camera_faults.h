@@ -68,16 +68,26 @@ public:
   double imagesAhead() const;
 
 private:
+  /** Messages of one kind since the last one of the other kind. */
+  struct Alone
+  {
+    int count = 0;
+    double since = 0.0;  // when the first of them came
+
+    /** @return whether they are too many to wait for the other kind. */
+    bool add(double time);
+  };
+
   std::optional<CameraTraffic> unpaired(double time) const;
 
   int queue_size_;
   bool paired_before_ = false;
-  int images_ = 0;            // since the last pair
-  int infos_ = 0;             // since the last pair
-  double both_since_ = 0.0;   // when the first message came after which both kinds had come since the last pair
-  int images_alone_ = 0;      // since the last camera_info
-  double alone_since_ = 0.0;  // when the first of them came
-  ros::Time image_stamp_;     // of the newest
+  int images_ = 0;           // since the last pair
+  int infos_ = 0;            // since the last pair
+  double both_since_ = 0.0;  // when the first message came after which both kinds had come since the last pair
+  Alone images_alone_;
+  Alone infos_alone_;
+  ros::Time image_stamp_;  // of the newest
   ros::Time info_stamp_;
 };
 
