@@ -35,6 +35,8 @@ PATIENCE = tried_commands.PATIENCE
 KNOWN_NAMES = {
     "x_cur ~ H x_ref": "a formula",
     "tf2_msgs/TFMessage": "a type, the Python side of which need not be installed",
+    "dynamic_reconfigure.client": "a module of Python",
+    "python3-dynamic-reconfigure": "a package of Debian",
     "src": "of a catkin workspace",
     "$ROS_HOME/view_servo/views": "a directory of the user's",
     "NAME.yaml": "a file of the user's",

@@ -21,9 +21,11 @@
 #include <tf2_ros/static_transform_broadcaster.h>
 
 #include <atomic>
+#include <cmath>
 #include <memory>
 #include <mutex>
 #include <string>
+#include <thread>
 #include <vector>
 
 namespace view_servo
@@ -86,10 +88,13 @@ public:
     broadcaster_.sendTransform(
         sim::toTransform(scene().world.camera_on_base, sim::BASE_FRAME, sim::CAMERA_FRAME, ros::Time::now()));
     start(RATE, [this](int cycle) { publish(cycle); });
+    painter_ = std::thread([this] { draw(); });
   }
   ~FakeBase() override
   {
     stop();
+    ends_ = true;
+    painter_.join();
   }
 
   void obey(const CommandsOf<Command>& commands)
@@ -180,28 +185,47 @@ public:
 private:
   static constexpr double RATE = 50.0;  // of odometry [Hz]
 
-  /** Where the camera sees the view from. */
-  PlanarPose seenFrom() const
+  /** A picture, and where the base was when it was taken. */
+  struct Picture
+  {
+    PlanarPose base;
+    cv::Mat image;
+  };
+
+  /** Where the base would be if it drove as it is seen to. */
+  PlanarPose seenFrom()
   {
     constexpr double WAY = 0.2;   // of what the wheels make
     constexpr double TURN = 0.6;  // of what they turn
+    const std::lock_guard<std::mutex> lock(publisher_mutex_);
     const PlanarPose driven = compose(inverse(scene().base), base_);
     return compose(scene().base, { WAY * driven.x, WAY * driven.y, TURN * driven.yaw });
   }
 
-  /** What the camera sees; in the thread that publishes. */
-  cv::Mat picture()
+  /** Draws what the camera sees while the base moves, beside what is published: it takes a while. */
+  void draw()
   {
-    if (base_.x == scene().base.x && base_.y == scene().base.y && base_.yaw == scene().base.yaw)
+    constexpr double STEP = 1e-3;  // [m, rad]
+    std::unique_ptr<sim::SimulatedCamera> renderer;
+    PlanarPose drawn = scene().base;
+    while (!ends_)
     {
-      return scene().image;
+      const PlanarPose base = seenFrom();
+      if (compose(inverse(drawn), base).distance() < STEP && std::abs(base.yaw - drawn.yaw) < STEP)
+      {
+        ros::WallDuration(0.02).sleep();
+        continue;
+      }
+      if (!renderer)
+      {
+        renderer = std::make_unique<sim::SimulatedCamera>(scene().world, std::vector<std::string>(), 1);
+      }
+      drawn = base;
+      const Eigen::Isometry3d pose = sim::planarPose(base.x, base.y, base.yaw);
+      const Picture picture{ base, renderer->capture(pose * scene().world.camera_on_base) };
+      const std::lock_guard<std::mutex> lock(publisher_mutex_);
+      picture_ = picture;
     }
-    if (!renderer_)
-    {
-      renderer_ = std::make_unique<sim::SimulatedCamera>(scene().world, std::vector<std::string>(), 1);
-    }
-    const PlanarPose seen_from = seenFrom();
-    return renderer_->capture(sim::planarPose(seen_from.x, seen_from.y, seen_from.yaw) * scene().world.camera_on_base);
   }
 
   void publish(int cycle)
@@ -230,7 +254,7 @@ private:
     info.header.frame_id = camera_frame_;
     if (camera)
     {
-      cv::Mat image = black ? cv::Mat(scene().image.size(), CV_8UC1, cv::Scalar(0)) : picture();
+      cv::Mat image = black ? cv::Mat(scene().image.size(), CV_8UC1, cv::Scalar(0)) : picture_.image;
       if (elsewhere_)
       {
         image = texturedPicture(7, image.size());
@@ -270,7 +294,7 @@ private:
     const CameraMount mount(scene().world.camera_on_base);
     const Camera& lens = scene().world.camera;
     const PlanarPose at_first = mount.ofCamera(inverse(scene().base));
-    const PlanarPose now = mount.ofCamera(inverse(seenFrom()));
+    const PlanarPose now = mount.ofCamera(inverse(picture_.base));
     for (PointMatch match : scene().matches)
     {
       const Correspondence pair{ mount.level(lens.normalized({ match.reference_x, match.reference_y })),
@@ -300,7 +324,7 @@ private:
 
   std::mutex publisher_mutex_;
   const CommandsOf<Command>* commands_ = nullptr;
-  std::unique_ptr<sim::SimulatedCamera> renderer_;
+  Picture picture_{ scene().base, scene().image };
   PlanarPose base_ = scene().base;        // by odometry
   std::atomic<bool> elsewhere_{ false };  // the camera sees something else
   std::string odometry_child_ = sim::BASE_FRAME;
@@ -311,6 +335,8 @@ private:
   ros::Publisher matches_;
   ros::Publisher lines_;
   tf2_ros::StaticTransformBroadcaster broadcaster_;
+  std::atomic<bool> ends_{ false };
+  std::thread painter_;
 };
 
 /** The same base, whose driver takes it for one that cannot slide. */
