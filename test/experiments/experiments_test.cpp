@@ -59,10 +59,11 @@ TEST(Experiments, RefusesRunsWhereNothingIsRepeated)
     const ProgramRun outcome = run(name + " --runs 3");
     EXPECT_EQ(outcome.status, 2);
     expectContains(outcome.err, "--runs: " + name + " repeats nothing");
-    expectContains(outcome.err,
-                   "homing, homing_differential, homing_structure, routes, arm, multi_hypothesis, real_pairs, "
-                   "profiles_parameters, "
-                   "view_consistency, rooms, false_answers, recognition, hand_eye, mount, cyclic_order, campaign do");
+    expectContains(
+        outcome.err,
+        "homing, homing_differential, homing_structure, routes, arm, arm_scene, multi_hypothesis, real_pairs, "
+        "profiles_parameters, "
+        "view_consistency, rooms, false_answers, recognition, hand_eye, mount, cyclic_order, campaign do");
   }
 }
 

@@ -132,14 +132,12 @@ TEST_F(ServoViewsTest, DrivesToOneAfterTheOther)
 
 TEST_F(ServoViewsTest, AsksEachViewForItsOwnTolerance)
 {
-  sendViews({ wanted("goal"), wanted(FIRST_VIEW, 0.03) });  // the narrow one first
+  sendViews({ wanted(FIRST_VIEW, 0.03), wanted("goal") });
+  ASSERT_TRUE(waitUntil([this] { return robot_.wantedView().view == "goal"; })) << reason();
   const Clock::time_point moment = Clock::now();
   ASSERT_TRUE(waitUntil([&] { return commands_.lastMotionAfter(moment) > 1.5; })) << reason();
-  EXPECT_EQ(robot_.wantedView().view, "goal");
-  EXPECT_EQ(reason().find("view 'goal', 1 of 2: "), 0U) << reason();
+  EXPECT_EQ(reason().find("view 'goal', 2 of 2: "), 0U) << reason();
   robot_.offset = 2e-4;
-  ASSERT_TRUE(waitUntil([this] { return robot_.wantedView().view == FIRST_VIEW; })) << reason();
-  robot_.offset = 0.02;
   EXPECT_TRUE(result().success);
 }
 
