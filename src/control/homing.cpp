@@ -319,7 +319,10 @@ protected:
       {
         tracked_ = report_.tracked = true;
         correctScale(camera, result.pose);
-        watch_.add(toIsometry(camera), toIsometry(result.pose), scale_);
+        if (params_.check_motion)
+        {
+          watch_.add(toIsometry(camera), toIsometry(result.pose), scale_);
+        }
         report_.inliers = result.supporting;
         report_.confidence = static_cast<double>(result.supporting) / result.looked_for;
         report_.displacement = result.displacement;
@@ -493,7 +496,7 @@ private:
       return false;
     }
     tracker_ = std::move(fresh);
-    if (view_in_odom_)
+    if (view_in_odom_ && params_.check_motion)
     {
       watch_.restart(toIsometry(*view_in_odom_));
     }
@@ -824,6 +827,8 @@ std::vector<Parameter> rowsOfHoming(HomingParams& params)
     real("arrival_distance", params.arrival_distance, "m", "> 0",
          "distance at which the heading is published as ARRIVED"),
     real("arrival_yaw", params.arrival_yaw, "rad", "> 0", "yaw error at which the heading is published as ARRIVED"),
+    boolean("check_motion", params.check_motion,
+            "whether the view has to be seen to move as the base does by odometry; false: for a base on a stand"),
     real("min_similarity", params.min_similarity, "", "[-1, 1)",
          "least correlation of the gradients where homing may end"),
     real("docking_displacement", params.docking_displacement, "px", "> 0",

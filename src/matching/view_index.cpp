@@ -687,7 +687,7 @@ void ViewIndex::load(std::istream& stream)
     }
   }
   ViewIndex read(params_);
-  const std::runtime_error damaged("the view index is damaged");
+  constexpr const char* DAMAGED = "the view index is damaged";
   const auto views = in.get<std::uint32_t>();
   for (std::uint32_t slot = 0; slot < views; ++slot)
   {
@@ -696,7 +696,7 @@ void ViewIndex::load(std::istream& stream)
     view.features = in.get<std::uint32_t>();
     if (!view.name.empty() && !read.slots_.emplace(view.name, slot).second)
     {
-      throw damaged;
+      throw std::runtime_error(DAMAGED);
     }
     read.views_.push_back(std::move(view));
   }
@@ -719,18 +719,18 @@ void ViewIndex::load(std::istream& stream)
   const std::uint64_t expected = in.sum();
   if (in.get<std::uint64_t>() != expected || !read.isConsistent())
   {
-    throw damaged;
+    throw std::runtime_error(DAMAGED);
   }
   *this = std::move(read);
 }
 
 bool ViewIndex::isConsistent() const
 {
-  const auto isFree = [&](std::uint32_t slot) {
+  const auto is_free = [&](std::uint32_t slot) {
     return slot < views_.size() && views_[slot].name.empty();
   };
   if (nodes_.empty() || slots_.size() + free_.size() != views_.size() ||
-      !std::all_of(free_.begin(), free_.end(), isFree))
+      !std::all_of(free_.begin(), free_.end(), is_free))
   {
     return false;
   }

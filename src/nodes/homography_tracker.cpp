@@ -43,6 +43,7 @@
 #include <memory>
 #include <mutex>
 #include <optional>
+#include <set>
 #include <stdexcept>
 #include <string>
 #include <thread>
@@ -81,7 +82,7 @@ struct Unfound
   std_msgs::Header header;
   cv::Mat image;  // grey, with distortion
   std::optional<Eigen::Isometry3d> camera_in_odom;
-  bool searched = false;  // a search has begun in it
+  std::set<TargetTracker::Search> searched;  // kinds of search that have begun in it
 };
 
 /** What diagnostics report. */
@@ -315,7 +316,7 @@ private:
     {
       guarded("the answer of a search", [&] { processAnswer(task); });
     }
-    else if (unfound_ && !unfound_->searched && searcher_.ready())
+    else if (unfound_ && unfound_->searched.count(session_->wanted()) == 0 && searcher_.ready())
     {
       search();
     }
@@ -368,7 +369,7 @@ private:
     unfound_.reset();
     if (track.state != TrackingState::TRACKING)
     {
-      unfound_ = Unfound{ header, image, camera_in_odom };
+      unfound_ = Unfound{ header, image, camera_in_odom, {} };
       if (searcher_.ready())
       {
         search();
@@ -416,8 +417,8 @@ private:
   /** Begins to look for the view in the newest image. */
   void search()
   {
+    unfound_->searched.insert(session_->wanted());
     beginSearch(unfound_->image, unfound_->camera_in_odom);
-    unfound_->searched = true;
   }
 
   /** Begins the search that the session wants. */

@@ -104,6 +104,7 @@ void takePrior(const std::vector<Depth>& depths, double pixel, ScenePoint& point
   constexpr double A_PIXEL_AWAY = 0.004;
   constexpr double LARGEST = 0.5;
   std::vector<std::pair<double, double>> nearest;  // distance, inverse depth
+  nearest.reserve(depths.size());
   for (const Depth& depth : depths)
   {
     nearest.emplace_back((depth.point - point.point).norm(), depth.inverse);
@@ -119,6 +120,7 @@ void takePrior(const std::vector<Depth>& depths, double pixel, ScenePoint& point
   }
   point.prior = medianOf(values);
   std::vector<double> deviations;
+  deviations.reserve(values.size());
   for (const double value : values)
   {
     deviations.push_back(std::abs(value - point.prior));
@@ -165,6 +167,7 @@ Eigen::Isometry3d beginStructure(const RelativePose& motion, const Correspondenc
   if (known)
   {
     std::vector<double> inverses;
+    inverses.reserve(depths.size());
     for (const Depth& depth : depths)
     {
       inverses.push_back(depth.inverse);

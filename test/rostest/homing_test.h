@@ -14,18 +14,14 @@
 #include "view_servo/HomeToViewAction.h"
 #include "view_servo/LineMatches.h"
 #include "view_servo/PointMatches.h"
-#include "view_servo/geometry/planar_motion.h"
 #include "view_servo/geometry/planar_pose.h"
 
 #include <geometry_msgs/Twist.h>
 #include <tf2_ros/static_transform_broadcaster.h>
 
 #include <atomic>
-#include <cmath>
-#include <memory>
 #include <mutex>
 #include <string>
-#include <thread>
 #include <vector>
 
 namespace view_servo
@@ -59,10 +55,7 @@ inline const Scene& scene()
   return made;
 }
 
-/**
- * A base, with a camera and a matcher, whose wheels turn as they are told. What it sees changes as if it drove a fifth as
- * fast as its wheels turn, so that it does not arrive while a test looks on.
- */
+/** A base on a stand, with a camera and a matcher: its wheels turn as they are told, what it sees does not change. */
 class FakeBase : public FakeRobot
 {
 public:
@@ -74,7 +67,7 @@ public:
   static constexpr const char* SILENT = "no matches";
   static std::vector<std::string> program()
   {
-    return { HOMING_PATH };
+    return { HOMING_PATH, "_check_motion:=false" };
   }
 
   explicit FakeBase(const std::string& ns) : FakeRobot(ns, DRIVER)
@@ -88,13 +81,10 @@ public:
     broadcaster_.sendTransform(
         sim::toTransform(scene().world.camera_on_base, sim::BASE_FRAME, sim::CAMERA_FRAME, ros::Time::now()));
     start(RATE, [this](int cycle) { publish(cycle); });
-    painter_ = std::thread([this] { draw(); });
   }
   ~FakeBase() override
   {
     stop();
-    ends_ = true;
-    painter_.join();
   }
 
   void obey(const CommandsOf<Command>& commands)
@@ -185,49 +175,6 @@ public:
 private:
   static constexpr double RATE = 50.0;  // of odometry [Hz]
 
-  /** A picture, and where the base was when it was taken. */
-  struct Picture
-  {
-    PlanarPose base;
-    cv::Mat image;
-  };
-
-  /** Where the base would be if it drove as it is seen to. */
-  PlanarPose seenFrom()
-  {
-    constexpr double WAY = 0.2;   // of what the wheels make
-    constexpr double TURN = 0.6;  // of what they turn
-    const std::lock_guard<std::mutex> lock(publisher_mutex_);
-    const PlanarPose driven = compose(inverse(scene().base), base_);
-    return compose(scene().base, { WAY * driven.x, WAY * driven.y, TURN * driven.yaw });
-  }
-
-  /** Draws what the camera sees while the base moves, beside what is published: it takes a while. */
-  void draw()
-  {
-    constexpr double STEP = 1e-3;  // [m, rad]
-    std::unique_ptr<sim::SimulatedCamera> renderer;
-    PlanarPose drawn = scene().base;
-    while (!ends_)
-    {
-      const PlanarPose base = seenFrom();
-      if (compose(inverse(drawn), base).distance() < STEP && std::abs(base.yaw - drawn.yaw) < STEP)
-      {
-        ros::WallDuration(0.02).sleep();
-        continue;
-      }
-      if (!renderer)
-      {
-        renderer = std::make_unique<sim::SimulatedCamera>(scene().world, std::vector<std::string>(), 1);
-      }
-      drawn = base;
-      const Eigen::Isometry3d pose = sim::planarPose(base.x, base.y, base.yaw);
-      const Picture picture{ base, renderer->capture(pose * scene().world.camera_on_base) };
-      const std::lock_guard<std::mutex> lock(publisher_mutex_);
-      picture_ = picture;
-    }
-  }
-
   void publish(int cycle)
   {
     constexpr int IMAGE_EVERY = 5;
@@ -254,7 +201,7 @@ private:
     info.header.frame_id = camera_frame_;
     if (camera)
     {
-      cv::Mat image = black ? cv::Mat(scene().image.size(), CV_8UC1, cv::Scalar(0)) : picture_.image;
+      cv::Mat image = black ? cv::Mat(scene().image.size(), CV_8UC1, cv::Scalar(0)) : scene().image;
       if (elsewhere_)
       {
         image = texturedPicture(7, image.size());
@@ -286,29 +233,7 @@ private:
     PointMatches message;
     message.header = header;
     message.view = wantedView().view;
-    if (black)
-    {
-      return message;
-    }
-    // Where the points that were matched at first are to be seen from where the camera is now.
-    const CameraMount mount(scene().world.camera_on_base);
-    const Camera& lens = scene().world.camera;
-    const PlanarPose at_first = mount.ofCamera(inverse(scene().base));
-    const PlanarPose now = mount.ofCamera(inverse(picture_.base));
-    for (PointMatch match : scene().matches)
-    {
-      const Correspondence pair{ mount.level(lens.normalized({ match.reference_x, match.reference_y })),
-                                 mount.level(lens.normalized({ match.current_x, match.current_y })) };
-      const Eigen::Vector2d seen = project({ pair.reference, inverseDepth(pair, at_first).value }, now);
-      const Eigen::Vector2d moved = seen - project({ pair.reference, inverseDepth(pair, at_first).value }, at_first);
-      const Eigen::Vector2d pixel = lens.project(mount.unlevel(pair.current + moved).homogeneous());
-      if (pixel.allFinite())
-      {
-        match.current_x = pixel.x();
-        match.current_y = pixel.y();
-        message.matches.push_back(match);
-      }
-    }
+    message.matches = black ? std::vector<PointMatch>() : scene().matches;
     return message;
   }
 
@@ -324,7 +249,6 @@ private:
 
   std::mutex publisher_mutex_;
   const CommandsOf<Command>* commands_ = nullptr;
-  Picture picture_{ scene().base, scene().image };
   PlanarPose base_ = scene().base;        // by odometry
   std::atomic<bool> elsewhere_{ false };  // the camera sees something else
   std::string odometry_child_ = sim::BASE_FRAME;
@@ -335,8 +259,6 @@ private:
   ros::Publisher matches_;
   ros::Publisher lines_;
   tf2_ros::StaticTransformBroadcaster broadcaster_;
-  std::atomic<bool> ends_{ false };
-  std::thread painter_;
 };
 
 /** The same base, whose driver takes it for one that cannot slide. */
@@ -347,7 +269,7 @@ public:
   static constexpr const char* NAMESPACE = "differential";
   static std::vector<std::string> program()
   {
-    return { HOMING_PATH, "_base:=differential" };
+    return { HOMING_PATH, "_base:=differential", "_check_motion:=false" };
   }
 };
 

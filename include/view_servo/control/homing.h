@@ -51,6 +51,7 @@ struct HomingParams
   double arrival_distance = 0.01;      ///< within it the view counts as reached, though the base still drives [m]
   double arrival_yaw = 0.0175;         ///< yaw error within which the view counts as reached [rad]
   double docking_displacement = 40.0;  ///< homing docks below this median displacement of the view's points [px]
+  bool check_motion = true;            ///< whether the view has to be seen to move as odometry says; see PlaceWatch
   double min_similarity = 0.3;         ///< homing ends only where gradientSimilarity() is at least this
 
   // Mode THESIS.
