@@ -57,7 +57,7 @@ void read(const rosbag::Bag& bag, const HandEyeSources& sources, HandEyeRecordin
   for (const rosbag::MessageInstance& instance :
        rosbag::View(bag, rosbag::TopicQuery(topicOf(sources.tracker, "homography"))))
   {
-    recording.homographies.push_back(instance.instantiate<Homography>());
+    recording.homographies.emplace_back(instance.instantiate<Homography>());
   }
 }
 
