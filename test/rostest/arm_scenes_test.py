@@ -54,7 +54,7 @@ class ArmScenes(graph.GraphTest):
         return [homography for homography in self.homographies if homography.valid]
 
     def test_parts_are_followed_as_a_scene_without_being_told(self):
-        valid = self.arrive("world:=parts", "start:=near")
+        valid = self.arrive("world:=parts", "start:=near", "target:=auto")
         self.assertIn("scene", self.followed_as)
         # Before, the plane that most of it is near to may have been followed for a moment.
         last = valid[-1]

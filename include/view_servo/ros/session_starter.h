@@ -29,7 +29,7 @@ struct SessionStarterParams
   std::filesystem::path views_dir;       ///< where stored views are; empty: as viewsDir() says
   std::string odom_frame = "base_link";  ///< frame that does not jump; empty: none
   double tf_patience = 0.05;             ///< longest wait of an image for tf [s]
-  Target target = Target::AUTO;          ///< what views are taken to show
+  Target target = Target::PLANE;         ///< what views are taken to show
   PlaneTrackerParams tracker;
 };
 
