@@ -29,11 +29,8 @@ std::vector<Parameter> parameters(SessionStarterParams& params)
                "empty: do without"),
           real("tf_patience", params.tf_patience, "s", ">= 0",
                "how long an image waits for tf to know where its camera was; then it is followed without"),
-          choice<Target>(
-              "target", params.target,
-              { { "plane", Target::PLANE }, { "scene", Target::SCENE }, { "auto", Target::AUTO } },
-              "whether views show one plane or a scene, which has things at different depths; auto takes them for "
-              "planes until a search finds depth"),
+          choice<Target>("target", params.target, { { "plane", Target::PLANE }, { "scene", Target::SCENE } },
+                         "whether views show one plane, or a scene, which has things at different depths"),
       },
       parameters(params.tracker),
   });

