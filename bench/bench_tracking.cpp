@@ -5,7 +5,7 @@
  * Homography tracking beside other means, on sequences of a plane, one thread, in one run:
  *
  *     bench_tracking speeds|ecc|hardships [PICTURE]
- *     bench_tracking video
+ *     bench_tracking video [FILE [X Y WIDTH HEIGHT]]
  *
  * speeds: 200 frames of 640x480, full 6-dof motion at 2 to 40 px a frame (mean of the image's corners), noise of 2 grey
  * levels; then the same while the light changes by 40 %, in gain and across the image. Told are the frames before it is
@@ -19,7 +19,9 @@
  * hardships, what a tracker has to bear: 40 % of the plane covered by something that moves, and jumps of 150 px that
  * odometry tells of.
  * video: drift over bruegel.mp4 in the folder visp_planar_videos of VIEW_SERVO_DATA, from frame 0 alone; errors are
- * those of the corners of the region of interest, against a registration of each frame with frame 0.
+ * those of the corners of the region of interest, against a registration of each frame with frame 0. Of a FILE of one's
+ * own the region is said, or the middle of frame 0; it has to show a plane. Its frames, 300 at most, are registered with
+ * frame 0 by key points and findTransformECC; those for which that does not succeed are tracked, and not judged.
  */
 #include "view_servo/geometry/homography.h"
 #include "view_servo/images/image_io.h"
@@ -27,20 +29,19 @@
 #include "view_servo/tracking/homography_aligner.h"
 
 #include "sim/textures.h"
+#include "tools/video.h"
 
+#include <visp3/core/vpException.h>
+#include <visp3/tt/vpTemplateTrackerSSDInverseCompositional.h>
+#include <visp3/tt/vpTemplateTrackerWarpHomography.h>
 #include <Eigen/Geometry>
 #include <Eigen/LU>
 #include <opencv2/calib3d.hpp>
 #include <opencv2/core.hpp>
 #include <opencv2/core/eigen.hpp>
+#include <opencv2/features2d.hpp>
 #include <opencv2/imgproc.hpp>
 #include <opencv2/video/tracking.hpp>
-#ifdef HAVE_VIDEOIO
-#include <opencv2/videoio.hpp>
-#endif
-#include <visp3/core/vpException.h>
-#include <visp3/tt/vpTemplateTrackerSSDInverseCompositional.h>
-#include <visp3/tt/vpTemplateTrackerWarpHomography.h>
 
 #include <algorithm>
 #include <cmath>
@@ -345,6 +346,7 @@ Tracker ecc(const cv::Mat& reference)
 struct Score
 {
   int frames = 0;             // before it is lost
+  int judged = 0;             // of these
   double error = 0.0;         // mean of all corners and frames [px]
   double worst_frame = 0.0;   // mean of its corners [px]
   double worst_corner = 0.0;  // [px]
@@ -355,6 +357,7 @@ struct Score
 using Camera = std::function<cv::Mat(int frame, const Eigen::Matrix3d& h)>;
 
 /**
+ * @param truth of each frame; not finite where it is not known.
  * @param odometry noise of the predicted motion, as a part of it; negative: no prediction.
  * @param corners of the stored view, where errors are measured [px].
  */
@@ -385,12 +388,19 @@ Score run(const Tracker& tracker, const std::vector<Eigen::Matrix3d>& truth, con
     const std::clock_t start = std::clock();
     const std::optional<Eigen::Matrix3d> found = tracker(image, predicted);
     times.push_back(1e3 * static_cast<double>(std::clock() - start) / CLOCKS_PER_SEC);
+    if (found && !h.allFinite())
+    {
+      ++score.frames;
+      last = *found;
+      continue;
+    }
     const CornerDistance error = found ? cornerDistance(*found, h, corners) : CornerDistance{ LOST, LOST };
     if (!(error.mean < LOST))
     {
       break;
     }
     ++score.frames;
+    ++score.judged;
     score.error += error.mean;
     score.worst_frame = std::max(score.worst_frame, error.mean);
     score.worst_corner = std::max(score.worst_corner, error.largest);
@@ -400,7 +410,7 @@ Score run(const Tracker& tracker, const std::vector<Eigen::Matrix3d>& truth, con
   const auto middle = times.begin() + static_cast<std::ptrdiff_t>(times.size() / 2);
   std::nth_element(times.begin(), middle, times.end());
   score.ms = times.empty() ? 0.0 : *middle;
-  score.error /= std::max(1, score.frames);
+  score.error /= std::max(1, score.judged);
   return score;
 }
 
@@ -465,7 +475,6 @@ void runHardships(const Scene& scene, const cv::Mat& reference)
   print("KLT", run(patchFlow(reference), jumping, plain, 0.01));
 }
 
-#ifdef HAVE_VIDEOIO
 /** What there is of the video: where frame 0's region of interest is, and where each frame shows it. */
 struct VideoTruth
 {
@@ -510,8 +519,37 @@ VideoTruth readVideoTruth(const std::filesystem::path& file)
   return truth;
 }
 
+/** The frames of a video, `most` at most; 0: all. */
+std::vector<cv::Mat> readFrames(const std::filesystem::path& file, std::size_t most)
+{
+  Video video(file.string());
+  std::vector<cv::Mat> frames;
+  for (cv::Mat frame = video.next(); !frame.empty() && frames.size() < most; frame = video.next())
+  {
+    frames.push_back(frame);
+  }
+  return frames;
+}
+
 /** Drift over a real video, whose frames are all tracked from frame 0. */
-void runVideo()
+void printDrift(const std::string& name, const std::vector<cv::Mat>& frames, const cv::Rect& region,
+                const VideoTruth& truth)
+{
+  const Camera camera = [&](int frame, const Eigen::Matrix3d& /*h*/) {
+    return frames[static_cast<std::size_t>(frame)];
+  };
+  const auto drift = [&](const Tracker& tracker) {
+    return run(tracker, truth.h, camera, -1.0, truth.corners);
+  };
+  const auto judged =
+      std::count_if(truth.h.begin(), truth.h.end(), [](const Eigen::Matrix3d& h) { return h.allFinite(); });
+  std::printf("%s, %zu frames, %td of them with a registration\n", name.c_str(), frames.size(), judged);
+  print("alone", drift(ours(frames[0], region)));
+  print("KLT", drift(patchFlow(frames[0], region)));
+  print("ViSP SSD", drift(visp(frames[0], region)));
+}
+
+void runSharedVideo()
 {
   const char* data = std::getenv("VIEW_SERVO_DATA");
   const std::filesystem::path folder = std::filesystem::path(data == nullptr ? "" : data) / "visp_planar_videos";
@@ -521,13 +559,7 @@ void runVideo()
     return;
   }
   const VideoTruth truth = readVideoTruth(folder / "bruegel_pseudo_gt.txt");
-  cv::VideoCapture capture((folder / "bruegel.mp4").string());
-  std::vector<cv::Mat> frames;
-  for (cv::Mat frame; frames.size() < truth.h.size() && capture.read(frame);)
-  {
-    frames.emplace_back();
-    cv::cvtColor(frame, frames.back(), cv::COLOR_BGR2GRAY);
-  }
+  const std::vector<cv::Mat> frames = readFrames(folder / "bruegel.mp4", truth.h.size());
   if (frames.size() < truth.h.size())
   {
     throw std::runtime_error("cannot read all frames of " + (folder / "bruegel.mp4").string());
@@ -537,24 +569,147 @@ void runVideo()
   {
     corners.emplace_back(static_cast<float>(corner.x()), static_cast<float>(corner.y()));
   }
-  const cv::Rect region = cv::boundingRect(corners) & cv::Rect(cv::Point(), frames[0].size());
-  const Camera camera = [&](int frame, const Eigen::Matrix3d& /*h*/) {
-    return frames[static_cast<std::size_t>(frame)];
-  };
-  const auto drift = [&](const Tracker& tracker) {
-    return run(tracker, truth.h, camera, -1.0, truth.corners);
-  };
-  std::printf("bruegel.mp4, %zu frames\n", frames.size());
-  print("alone", drift(ours(frames[0], region)));
-  print("KLT", drift(patchFlow(frames[0], region)));
-  print("ViSP SSD", drift(visp(frames[0], region)));
+  printDrift("bruegel.mp4", frames, cv::boundingRect(corners) & cv::Rect(cv::Point(), frames[0].size()), truth);
 }
-#else
-void runVideo()
+
+/** Finds a region of frame 0 in other frames, by none of the means that are compared here. */
+class Registration
 {
-  std::printf("video: skipped, this was built without OpenCV's videoio\n");
+public:
+  Registration(const cv::Mat& reference, const cv::Rect& region) : region_(region), view_(reference(region).clone())
+  {
+    detector_->detectAndCompute(view_, cv::noArray(), points_, descriptors_);
+    offset_(0, 2) = region.x;
+    offset_(1, 2) = region.y;
+  }
+
+  /** x_frame ~ H x_0; not finite when it is not found. */
+  Eigen::Matrix3d find(const cv::Mat& frame)
+  {
+    constexpr double LEAST_CORRELATION = 0.9;
+    const Eigen::Matrix3d unknown = Eigen::Matrix3d::Constant(std::nan(""));
+    cv::Mat h = byKeyPoints(frame);
+    if (h.empty())
+    {
+      return unknown;
+    }
+    h.convertTo(h, CV_32F);
+    try
+    {
+      const cv::TermCriteria end(cv::TermCriteria::COUNT + cv::TermCriteria::EPS, 50, 1e-5);
+      if (!(cv::findTransformECC(view_, frame, h, cv::MOTION_HOMOGRAPHY, end) > LEAST_CORRELATION))
+      {
+        return unknown;
+      }
+    }
+    catch (const cv::Exception&)
+    {
+      return unknown;  // it does not converge
+    }
+    h.convertTo(h, CV_64F);
+    Eigen::Matrix3d found;
+    cv::cv2eigen(h, found);
+    return found * offset_.inverse();
+  }
+
+private:
+  /** Of the region's picture; empty when too few agree. */
+  cv::Mat byKeyPoints(const cv::Mat& frame) const
+  {
+    constexpr std::size_t FEWEST = 20;
+    std::vector<cv::KeyPoint> points;
+    cv::Mat descriptors;
+    detector_->detectAndCompute(frame, cv::noArray(), points, descriptors);
+    if (descriptors_.empty() || descriptors.empty())
+    {
+      return {};
+    }
+    std::vector<cv::DMatch> matches;
+    cv::BFMatcher(cv::NORM_HAMMING, true).match(descriptors_, descriptors, matches);
+    std::vector<cv::Point2f> from;
+    std::vector<cv::Point2f> to;
+    for (const cv::DMatch& match : matches)
+    {
+      from.push_back(points_[static_cast<std::size_t>(match.queryIdx)].pt);
+      to.push_back(points[static_cast<std::size_t>(match.trainIdx)].pt);
+    }
+    if (from.size() < FEWEST)
+    {
+      return {};
+    }
+    std::vector<unsigned char> inliers;
+    cv::Mat h = cv::findHomography(from, to, cv::RANSAC, 2.0, inliers);
+    return cv::countNonZero(inliers) < static_cast<int>(FEWEST) ? cv::Mat() : h;
+  }
+
+  cv::Ptr<cv::ORB> detector_ = cv::ORB::create(2000);
+  cv::Rect region_;
+  cv::Mat view_;
+  std::vector<cv::KeyPoint> points_;
+  cv::Mat descriptors_;
+  Eigen::Matrix3d offset_ = Eigen::Matrix3d::Identity();  // x_0 ~ offset x_view
+};
+
+/** @param region empty: the middle of frame 0. */
+void runOwnVideo(const std::string& file, cv::Rect region)
+{
+  constexpr std::size_t MOST_FRAMES = 300;
+  const std::vector<cv::Mat> frames = readFrames(file, MOST_FRAMES);
+  if (frames.empty())
+  {
+    throw std::runtime_error("'" + file + "' has no frame that can be read");
+  }
+  const cv::Rect image(cv::Point(), frames[0].size());
+  if (region.empty())
+  {
+    region = cv::Rect(image.width / 4, image.height / 4, image.width / 2, image.height / 2);
+  }
+  if ((region & image) != region)
+  {
+    throw std::runtime_error("the region is not within the frames, which are " + std::to_string(image.width) + " x " +
+                             std::to_string(image.height));
+  }
+  VideoTruth truth;
+  for (const cv::Point& corner : { region.tl(), cv::Point(region.br().x - 1, region.y), region.br() - cv::Point(1, 1),
+                                   cv::Point(region.x, region.br().y - 1) })
+  {
+    truth.corners.emplace_back(corner.x, corner.y);
+  }
+  Registration registration(frames[0], region);
+  for (const cv::Mat& frame : frames)
+  {
+    truth.h.push_back(registration.find(frame));
+  }
+  printDrift(file, frames, region, truth);
 }
-#endif
+
+/** The words after `video`: nothing, a file, or a file and four whole numbers. */
+int runVideo(const std::vector<std::string>& words)
+{
+  if (words.empty())
+  {
+    runSharedVideo();
+    return 0;
+  }
+  cv::Rect region;
+  if (words.size() == 5)
+  {
+    std::istringstream numbers(words[1] + " " + words[2] + " " + words[3] + " " + words[4]);
+    numbers >> region.x >> region.y >> region.width >> region.height;
+    if (!numbers || !(numbers >> std::ws).eof() || region.empty())
+    {
+      std::fprintf(stderr, "bench_tracking: the region must be four whole numbers, X Y WIDTH HEIGHT\n");
+      return 2;
+    }
+  }
+  else if (words.size() != 1)
+  {
+    std::fprintf(stderr, "usage: bench_tracking video [FILE [X Y WIDTH HEIGHT]]\n");
+    return 2;
+  }
+  runOwnVideo(words[0], region);
+  return 0;
+}
 
 }  // namespace
 
@@ -563,7 +718,9 @@ int main(int argc, char** argv)
   const std::string part = argc > 1 ? argv[1] : "";
   if (part != "speeds" && part != "ecc" && part != "hardships" && part != "video")
   {
-    std::fprintf(stderr, "usage: bench_tracking speeds|ecc|hardships [PICTURE]\n       bench_tracking video\n");
+    std::fprintf(stderr,
+                 "usage: bench_tracking speeds|ecc|hardships [PICTURE]\n       bench_tracking video [FILE [X Y WIDTH "
+                 "HEIGHT]]\n");
     return 2;
   }
   cv::setNumThreads(1);
@@ -571,8 +728,7 @@ int main(int argc, char** argv)
   {
     if (part == "video")
     {
-      runVideo();
-      return 0;
+      return runVideo({ argv + 2, argv + argc });
     }
     const cv::Mat picture =
         argc > 2 ? readGreyImage(argv[2]) : sim::drawTexture("poster", cv::Size(2 * WIDTH, 2 * HEIGHT), 128.0, 20, 5);

@@ -8,10 +8,12 @@
 #include "sim_ros/robot_messages.h"
 #include "tools/command_line.h"
 #include "tools/package_folder.h"
+#include "tools/video.h"
 #include "view_servo/geometry/rotation_vector.h"
 #include "view_servo/images/image_io.h"
 #include "view_servo/parameters/error_text.h"
 #include "view_servo/ros/conversions.h"
+#include "view_servo/views/camera_file.h"
 
 #include <sensor_msgs/CompressedImage.h>
 #include <sensor_msgs/image_encodings.h>
@@ -20,6 +22,7 @@
 #include <opencv2/core/utils/logger.hpp>
 #include <opencv2/imgcodecs.hpp>
 
+#include <algorithm>
 #include <cmath>
 #include <cstdint>
 #include <cstdlib>
@@ -38,8 +41,8 @@
 /** @file
  * `record_bag WORLD TRAJECTORY OUT.bag` drives a simulated robot along a trajectory, without a ROS master, and writes
  * the messages that it would publish, with the ground truth. `record_bag --images FOLDER OUT.bag` writes recorded
- * images. The same command writes the same bytes. Exit status: 0 written; 2 bad input, with one line on standard error
- * that names the file or option, and no bag.
+ * images, `record_bag --video FILE OUT.bag` those of a video. The same command writes the same bytes. Exit status: 0
+ * written; 2 bad input, with one line on standard error that names the file or option, and no bag.
  */
 namespace
 {
@@ -61,6 +64,7 @@ constexpr char JOINT_STATES_TOPIC[] = "/joint_states";
 constexpr char TF_TOPIC[] = "/tf";
 constexpr char TF_STATIC_TOPIC[] = "/tf_static";
 
+constexpr double DEFAULT_RATE = 4.0;   // of images that have no times of their own [Hz]
 constexpr int STEPS_PER_SECOND = 100;  // of the simulation
 constexpr double DT = 1.0 / STEPS_PER_SECOND;
 constexpr double MAX_DURATION = 3600.0;  // of a trajectory [s]
@@ -72,7 +76,9 @@ struct Options
 {
   std::vector<std::string> names;
   std::string images;
-  double rate = 4.0;            // of images [Hz]
+  std::string video;
+  std::string camera;           // file of the video's calibration
+  std::optional<double> rate;   // of images [Hz]
   double odometry_rate = 20.0;  // or of encoders [Hz]
   double start_time = 1000.0;   // [s]
   std::uint64_t seed = 1;
@@ -286,7 +292,7 @@ void recordSimulation(const std::string& world_name, const std::string& trajecto
   {
     const ros::Time stamp = start + toDuration(step * DT);
     const Eigen::Isometry3d camera_pose = robot->cameraPose();
-    const bool image_due = isDue(step, options.rate);
+    const bool image_due = isDue(step, options.rate.value_or(DEFAULT_RATE));
     const bool sensors_due = isDue(step, options.odometry_rate);
     if (sensors_due)
     {
@@ -402,8 +408,58 @@ void recordImages(const std::string& file, const Options& options)
     }
     camera.width = image.cols;
     camera.height = image.rows;
-    header.stamp = startOf(options) + toDuration(static_cast<double>(i) / options.rate);
+    header.stamp = startOf(options) + toDuration(static_cast<double>(i) / options.rate.value_or(DEFAULT_RATE));
     bag.write(GROUND_TRUTH_TOPIC, header.stamp, sim::toGroundTruth(images[i].pose, header.stamp));
+    writeImage(bag, image, view_servo::toCameraInfo(camera, header), options);
+  }
+  bag.finish();
+}
+
+/**
+ * Writes a video: all its frames, stamped by its own rate, or as many of them as `--rate` wants. Without a calibration
+ * camera_info says the images' size alone.
+ */
+void recordVideo(const std::string& file, const Options& options)
+{
+  Video video(options.video);
+  const double rate = video.rate() > 0.0 ? video.rate() : options.rate.value_or(0.0);
+  if (!(rate > 0.0))
+  {
+    throw std::runtime_error("'" + options.video + "' does not say how many frames a second it has: say --rate");
+  }
+  const double wanted = std::min(rate, options.rate.value_or(rate));
+  Camera camera;
+  if (!options.camera.empty())
+  {
+    camera = readCameraFile(options.camera);
+  }
+  cv::Mat image = video.next();
+  if (image.empty())
+  {
+    throw std::runtime_error("'" + options.video + "' has no frame that can be read");
+  }
+  if (!options.camera.empty() && image.size() != cv::Size(camera.width, camera.height))
+  {
+    throw std::runtime_error("--calibration: '" + options.camera + "' is of images of " + std::to_string(camera.width) +
+                             " x " + std::to_string(camera.height) + ", the video's are " + std::to_string(image.cols) +
+                             " x " + std::to_string(image.rows));
+  }
+  camera.width = image.cols;
+  camera.height = image.rows;
+
+  BagWriter bag(file);
+  std_msgs::Header header;
+  header.frame_id = sim::CAMERA_FRAME;
+  constexpr double ROUNDING = 1e-6;  // of a period
+  double next = 0.0;                 // periods of the wanted rate until the next image is due
+  for (double frame = 0.0; !image.empty(); image = video.next(), ++frame)
+  {
+    if (frame / rate * wanted < next - ROUNDING)
+    {
+      continue;
+    }
+    ++next;
+    header.stamp = startOf(options) + toDuration(frame / rate);
     writeImage(bag, image, view_servo::toCameraInfo(camera, header), options);
   }
   bag.finish();
@@ -415,7 +471,10 @@ void addOptions(CommandLine& line, Options& options)
 {
   const NumberRange rates{ 0.001, STEPS_PER_SECOND };
   line.text("images", options.images, "Folder of recorded images with K.txt and poses.txt, instead of a world");
-  line.number("rate", options.rate, rates, "Images a second");
+  line.text("video", options.video, "File of a video, instead of a world");
+  line.text("calibration", options.camera,
+            "Of the video's camera: yaml of camera_calibration, or of a stored view; default: camera_info has none");
+  line.number("rate", options.rate, rates, "Images a second; default: 4, of a video all");
   line.number("start-time", options.start_time, { 1.0, 4e9 }, "Of the bag [s]");
   line.number("jpeg", options.jpeg, { 1.0, 100.0 },
               "Quality of JPEG images, on image_raw/compressed; default: images as they are, on image_raw");
@@ -438,29 +497,46 @@ void addOptions(CommandLine& line, Options& options)
   line.text("urdf", options.urdf, "File that describes the Puma; default: the package's");
 }
 
-/** Options that mean nothing for recorded images. */
-void refuseOptionsOfWorlds(const CommandLine& line)
+/** Options that mean nothing for recorded images. @param source "--images" or "--video". */
+void refuseOptionsOfWorlds(const CommandLine& line, const std::string& source)
 {
   for (const char* name : { "odometry-rate", "seed", "groups", "image-noise", "light-gain", "light-offset",
                             "focal-length-error", "odometry-drift", "odometry-noise", "encoder-noise", "urdf" })
   {
     if (line.has(name))
     {
-      throw std::runtime_error(std::string("--") + name + " is for simulated robots, not for --images");
+      throw std::runtime_error(std::string("--") + name + " is for simulated robots, not for " + source);
     }
+  }
+}
+
+void checkSources(const CommandLine& line, const Options& options)
+{
+  if (!options.images.empty() && !options.video.empty())
+  {
+    throw std::runtime_error("say --images or --video, not both");
+  }
+  if (options.video.empty() && !options.camera.empty())
+  {
+    throw std::runtime_error("--calibration is for --video: worlds and folders of images have their own");
+  }
+  if (!options.images.empty() || !options.video.empty())
+  {
+    refuseOptionsOfWorlds(line, options.images.empty() ? "--video" : "--images");
   }
 }
 
 void record(const Options& options)
 {
   const QuietStandardError quiet;
-  if (!options.images.empty())
+  if (!options.images.empty() || !options.video.empty())
   {
     if (options.names.size() != 1)
     {
-      throw std::runtime_error("say where to: record_bag --images FOLDER OUT.bag");
+      throw std::runtime_error(
+          "say where to, and nothing else: record_bag --images FOLDER OUT.bag, or --video FILE OUT.bag");
     }
-    recordImages(options.names.front(), options);
+    (options.video.empty() ? recordImages : recordVideo)(options.names.front(), options);
     return;
   }
   if (options.names.size() != 3)
@@ -480,9 +556,10 @@ int main(int argc, char** argv)
   {
     Options options;
     CommandLine line(
-        "Records a bag of a simulated robot or of a folder of images, with the ground truth:\n"
+        "Records a bag of a simulated robot or of a folder of images, with the ground truth, or of a video:\n"
         "  record_bag WORLD TRAJECTORY OUT.bag [OPTIONS]\n"
         "  record_bag --images FOLDER OUT.bag [OPTIONS]\n"
+        "  record_bag --video FILE OUT.bag [OPTIONS]\n"
         "WORLD is a world's file, or the name of one of the package's; TRAJECTORY the name of one of its.",
         "Exit status: 0 the bag was written, 2 bad input.");
     addOptions(line, options);
@@ -492,10 +569,7 @@ int main(int argc, char** argv)
       return WRITTEN;  // --help
     }
     options.names = *words;
-    if (!options.images.empty())
-    {
-      refuseOptionsOfWorlds(line);
-    }
+    checkSources(line, options);
     record(options);
     return WRITTEN;
   }

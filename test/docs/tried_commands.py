@@ -234,7 +234,7 @@ class TriedCommands(unittest.TestCase):
                     self.assertIn('<remap from="%s"' % name, self.read("launch", "arm_servo.launch"))
             return
         subcommand = [word for word in arguments[:1] if word in ("points", "lines", "scene", "find")]
-        if set(arguments) & {"...", "NAME", "DIR", "name=value"} or arguments == subcommand or (
+        if set(arguments) & {"...", "NAME", "DIR", "OUT.bag", "name=value"} or arguments == subcommand or (
                 arguments[-1].startswith("-") and len(arguments) > 1):
             options = [word for word in arguments if word.startswith("-")]  # a form: its options have to be there
             text = self.run_here(" ".join(["rosrun", package, program] + subcommand + ["--help"]))
