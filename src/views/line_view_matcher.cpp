@@ -49,6 +49,25 @@ bool isBetter(const SegmentMatch& a, const SegmentMatch& b)
   return quality(a) > quality(b);
 }
 
+/** Where the lines of neighbouring segments meet; some places lie beyond the border of the image. */
+std::vector<Corner> meetingPlaces(const LineFeatures& features)
+{
+  constexpr std::size_t MOST = 1500;
+  std::vector<Corner> places;
+  places.reserve(MOST);
+  for (int i = 0; i < features.groupedCount() && places.size() < MOST; ++i)
+  {
+    for (const LineFeatures::Meeting& meeting : features.meetings(i))
+    {
+      if (meeting.other > i)
+      {
+        places.push_back({ meeting.at, 0.0F });
+      }
+    }
+  }
+  return places;
+}
+
 /** One match of two images. */
 class LineAttempt
 {
@@ -101,6 +120,25 @@ public:
       region.matches = std::move(fresh);
       regions_.push_back(std::move(region));
     }
+  }
+
+  /**
+   * Drops regions but the best that are found at another place nearly as well: drawers of a cabinet one drawer off. The
+   * best is judged with all that lies on its plane, see isRepeated().
+   */
+  void dropRepeatedRegions()
+  {
+    constexpr double NEARLY = 0.7;  // what has grown at one place is found there more often than by chance
+    if (regions_.size() < 2)
+    {
+      return;
+    }
+    const std::vector<Corner> places = meetingPlaces(to_);
+    const auto is_repeated = [&](const LineRegion& region) {
+      return otherPlace(from_.smoothed(), to_.smoothed(), positionsOf(junctions(region)), places, region.h, NEARLY)
+          .has_value();
+    };
+    regions_.erase(std::remove_if(regions_.begin() + 1, regions_.end(), is_repeated), regions_.end());
   }
 
   /**
@@ -181,32 +219,8 @@ public:
     std::vector<MatchedPoint> found;
     for (const LineRegion& region : regions_)
     {
-      std::vector<const SegmentMatch*> of_reference(from_.segments().size(), nullptr);
-      for (const SegmentMatch& match : region.matches)
-      {
-        of_reference[static_cast<std::size_t>(match.reference)] = &match;
-      }
-      for (const SegmentMatch& match : region.matches)
-      {
-        if (match.reference >= from_.groupedCount())
-        {
-          continue;
-        }
-        for (const LineFeatures::Meeting& meeting : from_.meetings(match.reference))
-        {
-          const SegmentMatch* other = of_reference[static_cast<std::size_t>(meeting.other)];
-          if (other == nullptr || (meeting.other < match.reference && knows(meeting.other, match.reference)))
-          {
-            continue;
-          }
-          const auto at =
-              lineIntersection(to_.segment(match.current), to_.segment(other->current), LineFeatures::MIN_SINE);
-          if (at)
-          {
-            found.push_back({ { meeting.at, *at }, std::min(quality(match), quality(*other)), false });
-          }
-        }
-      }
+      const std::vector<MatchedPoint> of_region = junctions(region);
+      found.insert(found.end(), of_region.begin(), of_region.end());
     }
     return found;
   }
@@ -324,6 +338,39 @@ private:
       inliers.push_back(near[static_cast<std::size_t>(i)]);
     }
     return growLineRegion(from_, to_, found.model->h, inliers, params_.regions);
+  }
+
+  /** Intersections of neighbours that are matched in a region, each once. */
+  std::vector<MatchedPoint> junctions(const LineRegion& region) const
+  {
+    std::vector<MatchedPoint> found;
+    std::vector<const SegmentMatch*> of_reference(from_.segments().size(), nullptr);
+    for (const SegmentMatch& match : region.matches)
+    {
+      of_reference[static_cast<std::size_t>(match.reference)] = &match;
+    }
+    for (const SegmentMatch& match : region.matches)
+    {
+      if (match.reference >= from_.groupedCount())
+      {
+        continue;
+      }
+      for (const LineFeatures::Meeting& meeting : from_.meetings(match.reference))
+      {
+        const SegmentMatch* other = of_reference[static_cast<std::size_t>(meeting.other)];
+        if (other == nullptr || (meeting.other < match.reference && knows(meeting.other, match.reference)))
+        {
+          continue;
+        }
+        const auto at =
+            lineIntersection(to_.segment(match.current), to_.segment(other->current), LineFeatures::MIN_SINE);
+        if (at)
+        {
+          found.push_back({ { meeting.at, *at }, std::min(quality(match), quality(*other)), false });
+        }
+      }
+    }
+    return found;
   }
 
   Correspondence midpoint(const LineRegion& region, const SegmentMatch& match) const
@@ -446,25 +493,6 @@ bool addPoints(LineAttempt& attempt, const SegmentPairs& lines, const LinePlanes
 }
 
 constexpr std::size_t MIN_SEGMENTS = 6;
-
-/** Where the lines of neighbouring segments meet; some places lie beyond the border of the image. */
-std::vector<Corner> meetingPlaces(const LineFeatures& features)
-{
-  constexpr std::size_t MOST = 1500;
-  std::vector<Corner> places;
-  places.reserve(MOST);
-  for (int i = 0; i < features.groupedCount() && places.size() < MOST; ++i)
-  {
-    for (const LineFeatures::Meeting& meeting : features.meetings(i))
-    {
-      if (meeting.other > i)
-      {
-        places.push_back({ meeting.at, 0.0F });
-      }
-    }
-  }
-  return places;
-}
 
 /** Whether the first plane has more than half of the lines, and they are found elsewhere nearly as well. */
 bool isRepeated(const LineFeatures& reference, const LineFeatures& current, const ViewMatch& result)
@@ -623,6 +651,11 @@ ViewMatch LineViewMatcher::match(const LineFeatures& reference, const LineFeatur
   clock.finish("association");
   attempt.findRegions(association);
   clock.finish("regions");
+  if (params_.unique)
+  {
+    attempt.dropRepeatedRegions();
+  }
+  clock.finish("repetition");
   result.ransac = attempt.dropInconsistentRegions();
   clock.finish("ransac");
   result.log_significance = attempt.significance();

@@ -21,7 +21,6 @@ namespace
 {
 constexpr double RADIUS = 4.0;           // around where a homography sends a corner [px]
 constexpr double MIN_CORRELATION = 0.7;  // of a corner's patch that is found
-constexpr double NEARLY = 0.85;          // of the part of the matches that is found where it should be
 constexpr double LEAST_FOUND = 0.4;      // of the matches: too few tell nothing
 constexpr double APART = 8.0;            // nearer places are one [px]
 
@@ -50,11 +49,12 @@ public:
     }
   }
 
-  /** Those of the places, no nearer than APART, that look most like another one, the nearest first. */
+  /** Those of the places that look most like another one, and lie APART from it and each other; the nearest first. */
   std::vector<Eigen::Vector2d> like(const Eigen::Vector2d& site) const
   {
     constexpr float ALIKE = 0.8F;     // least correlation
     constexpr float AS_WELL = 0.05F;  // within this of the best
+    constexpr std::size_t MOST = 4;   // the lines of one thing look alike, and are nearer than the next such thing
     Eigen::VectorXf here(SIZE);
     if (!draw(site, here))
     {
@@ -68,10 +68,23 @@ public:
       correlation = (places_[i] - site).norm() >= APART ? correlation : 0.0F;
       least = std::max(least, correlation - AS_WELL);
     }
-    std::vector<Eigen::Vector2d> alike;
+    std::vector<std::size_t> order;
     for (std::size_t i = 0; i < places_.size(); ++i)
     {
       if (correlations[static_cast<Eigen::Index>(i)] >= least)
+      {
+        order.push_back(i);
+      }
+    }
+    std::stable_sort(order.begin(), order.end(), [&](std::size_t a, std::size_t b) {
+      return correlations[static_cast<Eigen::Index>(a)] > correlations[static_cast<Eigen::Index>(b)];
+    });
+    std::vector<Eigen::Vector2d> alike;
+    for (const std::size_t i : order)
+    {
+      if (alike.size() < MOST && std::all_of(alike.begin(), alike.end(), [&](const Eigen::Vector2d& other) {
+            return (places_[i] - other).norm() >= APART;
+          }))
       {
         alike.push_back(places_[i]);
       }
@@ -123,8 +136,9 @@ private:
 class Matches
 {
 public:
-  Matches(const cv::Mat& reference, const cv::Mat& current, const Correspondences& all, const Eigen::Matrix3d& h)
-    : reference_(reference), current_(current)
+  Matches(const cv::Mat& reference, const cv::Mat& current, const Correspondences& all, const Eigen::Matrix3d& h,
+          double nearly)
+    : reference_(reference), current_(current), nearly_(nearly)
   {
     constexpr std::size_t MOST = 150;
     guidance_.min_correlation = MIN_CORRELATION;
@@ -163,12 +177,12 @@ public:
     {
       other = *start;
       found = find(around, other, WIDER);
-      if (found.size() >= FEWEST && static_cast<double>(found.size()) >= NEARLY * here)
+      if (found.size() >= FEWEST && static_cast<double>(found.size()) >= nearly_ * here)
       {
         break;
       }
     }
-    if (found.size() < FEWEST || static_cast<double>(found.size()) < NEARLY * here)
+    if (found.size() < FEWEST || static_cast<double>(found.size()) < nearly_ * here)
     {
       return std::nullopt;
     }
@@ -194,7 +208,7 @@ public:
     const std::size_t found = find(corners_, other, RADIUS).size();
     return static_cast<double>(found) >= LEAST_FOUND * static_cast<double>(corners_.size()) &&
            2 * static_cast<std::size_t>(apart) >= corners_.size() &&
-           partFound(other, found) >= NEARLY * partFound(h, find(corners_, h, RADIUS).size());
+           partFound(other, found) >= nearly_ * partFound(h, find(corners_, h, RADIUS).size());
   }
 
 private:
@@ -252,6 +266,7 @@ private:
 
   const cv::Mat& reference_;
   const cv::Mat& current_;
+  double nearly_;  ///< see otherPlace()
   GuidedParams guidance_;
   std::vector<Corner> corners_;        ///< where they are in the reference image
   std::vector<Eigen::Vector2d> here_;  ///< where they are in the current image
@@ -289,23 +304,21 @@ std::vector<Eigen::Vector2d> spread(const Correspondences& matches, const cv::Si
 
 std::optional<Eigen::Matrix3d> otherPlace(const cv::Mat& reference, const cv::Mat& current,
                                           const Correspondences& matches, const std::vector<Corner>& current_corners,
-                                          const Eigen::Matrix3d& h)
+                                          const Eigen::Matrix3d& h, double nearly)
 {
   constexpr std::size_t FEWEST = 20;  // matches that can tell anything
   constexpr std::size_t SITES = 8;    // places from which another is looked for
-  constexpr std::size_t NEAREST = 2;  // of what looks alike is tried from each
   if (matches.size() < FEWEST)
   {
     return std::nullopt;
   }
   const Surroundings surroundings(current, current_corners);
-  const Matches tried(reference, current, matches, h);
+  const Matches tried(reference, current, matches, h, nearly);
   for (const Eigen::Vector2d& site : spread(matches, current.size(), SITES))
   {
-    const std::vector<Eigen::Vector2d> alike = surroundings.like(site);
-    for (std::size_t i = 0; i < std::min(alike.size(), NEAREST); ++i)
+    for (const Eigen::Vector2d& place : surroundings.like(site))
     {
-      auto other = tried.moved(h, site, alike[i]);
+      auto other = tried.moved(h, site, place);
       if (other && tried.areAlong(*other, h))
       {
         return other;

@@ -27,10 +27,11 @@ constexpr const char* REPEATED =
  * @param reference, current 8-bit, one channel.
  * @param matches that agree with `h`, x_cur ~ H x_ref [px].
  * @param current_corners places in the current image where what is there more than once may be found again.
+ * @param nearly least part of the matches found there, against the part that is found along `h`.
  * @return another homography along which nearly as large a part of the matches is found again; empty if there is none.
  */
 std::optional<Eigen::Matrix3d> otherPlace(const cv::Mat& reference, const cv::Mat& current,
                                           const Correspondences& matches, const std::vector<Corner>& current_corners,
-                                          const Eigen::Matrix3d& h);
+                                          const Eigen::Matrix3d& h, double nearly = 0.85);
 
 }  // namespace view_servo
