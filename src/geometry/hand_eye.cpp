@@ -68,7 +68,7 @@ Indices agreeingWithStart(const Problem& problem, const State& start)
 }
 
 /** Fills in what was estimated, and how uncertain that is. */
-void fillEstimate(const State& state, const ErrorModel& model, double arm_lever, HandEyeResult& result)
+void fillEstimate(const State& state, const ErrorModel& model, const HandEyeParams& params, HandEyeResult& result)
 {
   result.camera_in_flange = state.camera_in_flange;
   result.view_in_base = state.view_in_base;
@@ -76,10 +76,15 @@ void fillEstimate(const State& state, const ErrorModel& model, double arm_lever,
   result.distance = state.distance;
   const Eigen::MatrixXd covariance = model.variance * model.inverse;
   result.covariance = covariance.topLeftCorner<6, 6>();
-  result.distance_sigma = state.distance * std::sqrt(covariance(14, 14));
+  result.distance_sigma = state.distance * std::sqrt(covariance(DISTANCE, DISTANCE));
+  if (params.finds_focal_length)
+  {
+    result.focal_scale = state.focal_scale;
+    result.focal_sigma = state.focal_scale * std::sqrt(covariance(FOCAL_LENGTH, FOCAL_LENGTH));
+  }
   result.image_error = std::sqrt(model.variance);
   result.rotation_error = model.ratio * result.image_error;
-  result.translation_error = arm_lever * result.rotation_error;
+  result.translation_error = params.arm_lever * result.rotation_error;
 }
 
 /** How far the poses that were used are from one another. */
@@ -127,7 +132,7 @@ HandEyeResult calibrateHandEye(const HandEyeView& view, const std::vector<HandEy
   {
     throw std::invalid_argument("the distance of the plane has to be above 0");
   }
-  const Problem problem(view, poses, params.distance);
+  const Problem problem(view, poses, params.distance, !params.finds_focal_length);
   HandEyeResult result;
   result.residuals.resize(poses.size());
   result.motion = motionOf(problem, poses);
@@ -150,18 +155,32 @@ HandEyeResult calibrateHandEye(const HandEyeView& view, const std::vector<HandEy
   Indices used = agreeingWithStart(problem, state);
   ErrorModel model;
   result.message = refine(problem, params.arm_lever, state, used, model);
-  result.residuals = residualsOf(problem, state, used);
   if (!result.message.empty())
   {
+    result.residuals = residualsOf(problem, state, used);
     return result;
   }
 
-  fillEstimate(state, model, params.arm_lever, result);
-  result.motion = motionOfUsed(view, poses, used, state.normal);
+  fillEstimate(state, model, params, result);
+  HandEyeView true_view = view;
+  true_view.k = withFocalScale(view.k, state.focal_scale);
+  state.focal_scale = 1.0;
+  result.residuals = residualsOf(Problem(true_view, poses, params.distance), state, used);
+  result.motion = motionOfUsed(true_view, poses, used, state.normal);
   result.missing = missingMotion(result.motion, params);
   if (!result.missing.empty())
   {
     result.message = "too little motion, without the poses that disagree: " + join(result.missing, "; ");
+    return result;
+  }
+  if (params.finds_focal_length && !(result.focal_sigma <= params.max_focal_sigma))
+  {
+    result.missing.push_back("the poses do not tell the focal length, which would be " +
+                             rounded(result.focal_scale, 3) + " times what was said, uncertain by " +
+                             rounded(1e2 * result.focal_sigma, 1) +
+                             " % (standard deviation); add poses nearer and farther away, and poses that see the plane "
+                             "from aside, or calibrate without it");
+    result.message = result.missing.back();
     return result;
   }
   if (!(result.translationSigma() <= params.max_translation_sigma) ||

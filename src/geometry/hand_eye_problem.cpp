@@ -12,6 +12,8 @@ namespace view_servo::hand_eye
 {
 namespace
 {
+constexpr double EXACT = 1e10;  // one over the square of 1e-5, for one pixel of error in images
+
 Eigen::Matrix3d crossMatrix(const Eigen::Vector3d& v)
 {
   Eigen::Matrix3d matrix;
@@ -28,7 +30,20 @@ Eigen::Matrix<double, 3, 2> squareTo(const Eigen::Vector3d& unit)
   return basis;
 }
 
+/** A ray, z = 1, of a camera whose focal lengths are so many times as long. */
+Eigen::Vector3d scaledRay(const Eigen::Vector3d& ray, double focal_scale)
+{
+  return { ray.x() / focal_scale, ray.y() / focal_scale, 1.0 };
+}
+
 }  // namespace
+
+Eigen::Matrix3d withFocalScale(const Eigen::Matrix3d& k, double scale)
+{
+  Eigen::Matrix3d scaled = k;
+  scaled.leftCols<2>() *= scale;
+  return scaled;
+}
 
 State moved(const State& state, const Eigen::VectorXd& step)
 {
@@ -38,12 +53,14 @@ State moved(const State& state, const Eigen::VectorXd& step)
   next.view_in_base.translation() += step.segment<3>(6);
   next.view_in_base.linear() = rotationFromVector(step.segment<3>(9)) * state.view_in_base.linear();
   next.normal = (state.normal + squareTo(state.normal) * step.segment<2>(12)).normalized();
-  next.distance = state.distance * std::exp(step(14));
+  next.distance = state.distance * std::exp(step(DISTANCE));
+  next.focal_scale = state.focal_scale * std::exp(step(FOCAL_LENGTH));
   return next;
 }
 
-Problem::Problem(const HandEyeView& view, const std::vector<HandEyePose>& poses, double distance)
-  : view_(view), known_distance_(distance)
+Problem::Problem(const HandEyeView& view, const std::vector<HandEyePose>& poses, double distance,
+                 bool knows_focal_length)
+  : view_(view), known_distance_(distance), knows_focal_length_(knows_focal_length)
 {
   const Eigen::Matrix3d inverse = view.k.inverse();
   for (const Eigen::Vector2d& corner : view.corners)
@@ -131,17 +148,18 @@ bool Problem::errors(const State& state, std::size_t i, const Eigen::Isometry3d&
                      Eigen::VectorXd& errors) const
 {
   errors.resize(ROWS);
+  const Eigen::Matrix3d k = withFocalScale(view_.k, state.focal_scale);
   const Eigen::Isometry3d camera_from_view = state.camera_in_flange.inverse() * base_in_flange * state.view_in_base;
   for (int corner = 0; corner < CORNERS; ++corner)
   {
-    const Eigen::Vector3d& ray = rays_[static_cast<std::size_t>(corner)];
+    const Eigen::Vector3d ray = scaledRay(rays_[static_cast<std::size_t>(corner)], state.focal_scale);
     const double facing = state.normal.dot(ray);
     const Eigen::Vector3d point = camera_from_view * Eigen::Vector3d(ray * (state.distance / facing));
     if (!(facing > 0.0) || !(point.z() > 0.0))
     {
       return false;
     }
-    errors.segment<2>(2 * corner) = (view_.k * point).hnormalized() - observations_[i].corners.segment<2>(2 * corner);
+    errors.segment<2>(2 * corner) = (k * point).hnormalized() - observations_[i].corners.segment<2>(2 * corner);
   }
   return errors.allFinite();
 }
@@ -165,19 +183,20 @@ void Problem::linearize(const State& state, const Eigen::Isometry3d& base_in_fla
   const Eigen::Matrix3d camera_from_flange = state.camera_in_flange.linear().transpose();
   const Eigen::Matrix3d camera_from_base = camera_from_flange * base_in_flange.linear();
   const Eigen::Matrix<double, 3, 2> basis = squareTo(state.normal);
+  const Eigen::Matrix3d k = withFocalScale(view_.k, state.focal_scale);
   for (int corner = 0; corner < CORNERS; ++corner)
   {
-    const Eigen::Vector3d& ray = rays_[static_cast<std::size_t>(corner)];
+    const Eigen::Vector3d ray = scaledRay(rays_[static_cast<std::size_t>(corner)], state.focal_scale);
     const double facing = state.normal.dot(ray);
     const Eigen::Vector3d in_view = ray * (state.distance / facing);
     const Eigen::Vector3d turned = state.view_in_base.linear() * in_view;
     const Eigen::Vector3d in_flange = base_in_flange * (state.view_in_base * in_view);
     const Eigen::Vector3d in_camera = state.camera_in_flange.inverse() * in_flange;
 
-    const Eigen::Vector3d pixel = view_.k * in_camera;
+    const Eigen::Vector3d pixel = k * in_camera;
     Eigen::Matrix<double, 2, 3> projection;
-    projection << view_.k.row(0) / pixel.z() - view_.k.row(2) * (pixel.x() / (pixel.z() * pixel.z())),
-        view_.k.row(1) / pixel.z() - view_.k.row(2) * (pixel.y() / (pixel.z() * pixel.z()));
+    projection << k.row(0) / pixel.z() - k.row(2) * (pixel.x() / (pixel.z() * pixel.z())),
+        k.row(1) / pixel.z() - k.row(2) * (pixel.y() / (pixel.z() * pixel.z()));
 
     Eigen::Matrix<double, 3, DOF> point;
     point.block<3, 3>(0, 0) = -camera_from_flange;
@@ -187,8 +206,15 @@ void Problem::linearize(const State& state, const Eigen::Isometry3d& base_in_fla
     const Eigen::Vector3d farther = camera_from_base * turned;
     point.col(12) = farther * (-ray.dot(basis.col(0)) / facing);
     point.col(13) = farther * (-ray.dot(basis.col(1)) / facing);
-    point.col(14) = farther;
+    point.col(DISTANCE) = farther;
+    // A longer focal length moves the corner on the plane of the view, and then the point's picture.
+    const Eigen::Vector3d ray_change(-ray.x(), -ray.y(), 0.0);
+    const Eigen::Vector3d on_plane =
+        (ray_change - ray * (state.normal.dot(ray_change) / facing)) * (state.distance / facing);
+    point.col(FOCAL_LENGTH) = camera_from_base * state.view_in_base.linear() * on_plane;
     by_state.middleRows<2>(2 * corner) = projection * point;
+    const Eigen::Vector3d beside_axis = k * Eigen::Vector3d(in_camera.x(), in_camera.y(), 0.0);
+    by_state.block<2, 1>(2 * corner, FOCAL_LENGTH) += beside_axis.head<2>() / in_camera.z();
 
     Eigen::Matrix<double, 3, 6> moved;
     moved.leftCols<3>() = -camera_from_flange;
@@ -199,8 +225,17 @@ void Problem::linearize(const State& state, const Eigen::Isometry3d& base_in_fla
 
 double Problem::distanceWeight() const
 {
-  constexpr double EXACT = 1e10;  // one over the square of 1e-5, for one pixel of error in images
   return std::isnan(known_distance_) ? 0.0 : EXACT;
+}
+
+double Problem::focalLengthWeight() const
+{
+  return knows_focal_length_ ? EXACT : 0.0;
+}
+
+int Problem::knownUnknowns() const
+{
+  return (distanceWeight() > 0.0 ? 1 : 0) + (knows_focal_length_ ? 1 : 0);
 }
 
 double Problem::distanceError(const State& state) const

@@ -22,7 +22,10 @@ constexpr double NONE = std::numeric_limits<double>::quiet_NaN();    // a number
 constexpr double ENDLESS = std::numeric_limits<double>::infinity();  // larger than all errors
 constexpr int CORNERS = 4;                                           // of the view's region
 constexpr int ROWS = 2 * CORNERS;  // number of errors at a pose: u and v of each corner
-constexpr int DOF = 15;  // unknowns: camera on flange (6), view in base (6), direction (2) and distance of the plane
+constexpr int DISTANCE = 14;       // place of the distance's unknown in a step, see moved()
+constexpr int FOCAL_LENGTH = 15;   // and of the focal length's
+constexpr int DOF =
+    16;  // unknowns: camera on flange (6), view in base (6), direction (2) and distance of the plane, focal length
 constexpr int LEAST_POSES = 6;  // fewer determine nothing
 
 using Indices = std::vector<std::size_t>;
@@ -34,11 +37,15 @@ struct State
   Eigen::Isometry3d view_in_base;      ///< pose of the camera that stored the view, in the arm's base [m]
   Eigen::Vector3d normal;              ///< unit normal of the plane in that camera's frame
   double distance;                     ///< of the plane from that camera [m], > 0
+  double focal_scale = 1.0;            ///< true focal lengths over those of HandEyeView::k, > 0
 };
+
+/** A camera matrix [px] with focal lengths that are so many times as long. */
+Eigen::Matrix3d withFocalScale(const Eigen::Matrix3d& k, double scale);
 
 /**
  * A state after a step (DOF x 1): camera on flange, place [m] and rotation [rad] along the flange's axes; view in base
- * likewise; direction of the plane [rad]; logarithm of its distance.
+ * likewise; direction of the plane [rad]; logarithm of its distance; logarithm of the focal length's scale.
  */
 State moved(const State& state, const Eigen::VectorXd& step);
 
@@ -54,8 +61,12 @@ struct Observation
 class Problem
 {
 public:
-  /** @param view has to outlive this. @param distance of the plane from the view's camera [m]; NaN: not known. */
-  Problem(const HandEyeView& view, const std::vector<HandEyePose>& poses, double distance);
+  /**
+   * @param view has to outlive this. @param distance of the plane from the view's camera [m]; NaN: not known.
+   * @param knows_focal_length that of the view is true.
+   */
+  Problem(const HandEyeView& view, const std::vector<HandEyePose>& poses, double distance,
+          bool knows_focal_length = true);
 
   std::size_t size() const
   {
@@ -105,13 +116,20 @@ public:
   /** Weight of distanceError(): so large that a known distance is kept; 0 when none is known. */
   double distanceWeight() const;
 
+  /** Weight of log(State::focal_scale), which has to be 0 then: likewise. */
+  double focalLengthWeight() const;
+
+  /** How many of the unknowns are known. */
+  int knownUnknowns() const;
+
   /** log(distance of the state / known distance). */
   double distanceError(const State& state) const;
 
 private:
   const HandEyeView& view_;
   double known_distance_;
-  std::vector<Eigen::Vector3d> rays_;  // of the view's corners, z = 1
+  bool knows_focal_length_;
+  std::vector<Eigen::Vector3d> rays_;  // of the view's corners by its focal length, z = 1
   std::vector<Observation> observations_;
   std::vector<std::vector<EuclideanHomography>> decompositions_;  // of each pose's homography
 };

@@ -15,11 +15,11 @@ namespace
 /** Sums of Jᵀ J (DOF x DOF) and Jᵀ e (DOF x 1). */
 struct NormalEquations
 {
-  /** @param distance_weight as Problem::distanceWeight(). */
-  explicit NormalEquations(double distance_weight)
+  explicit NormalEquations(const Problem& problem)
     : matrix(Eigen::MatrixXd::Zero(DOF, DOF)), gradient(Eigen::VectorXd::Zero(DOF))
   {
-    matrix(14, 14) = distance_weight;
+    matrix(DISTANCE, DISTANCE) = problem.distanceWeight();
+    matrix(FOCAL_LENGTH, FOCAL_LENGTH) = problem.focalLengthWeight();
   }
 
   void add(const Eigen::MatrixXd& jacobian, const Eigen::VectorXd& errors)
@@ -47,7 +47,10 @@ public:
 
   double cost(const State& state) const
   {
-    double sum = problem_.distanceWeight() * problem_.distanceError(state) * problem_.distanceError(state);
+    const double distance_error = problem_.distanceError(state);
+    const double focal_error = std::log(state.focal_scale);
+    double sum = problem_.distanceWeight() * distance_error * distance_error +
+                 problem_.focalLengthWeight() * focal_error * focal_error;
     for (const std::size_t i : used_)
     {
       Eigen::VectorXd errors;
@@ -62,8 +65,9 @@ public:
 
   void linearize(const State& state, Eigen::MatrixXd& jtj, Eigen::VectorXd& gradient) const
   {
-    NormalEquations equations(problem_.distanceWeight());
-    equations.gradient(14) = problem_.distanceWeight() * problem_.distanceError(state);
+    NormalEquations equations(problem_);
+    equations.gradient(DISTANCE) = problem_.distanceWeight() * problem_.distanceError(state);
+    equations.gradient(FOCAL_LENGTH) = problem_.focalLengthWeight() * std::log(state.focal_scale);
     for (const std::size_t i : used_)
     {
       Eigen::VectorXd errors;
@@ -113,14 +117,14 @@ ErrorModel errorModel(const Problem& problem, const State& state, const Indices&
     problem.errors(state, used[k], errors[k]);
     problem.linearize(state, used[k], jacobians[k], by_arm[k]);
   }
-  const double freedom = static_cast<double>(ROWS * used.size()) - DOF + (problem.distanceWeight() > 0.0 ? 1.0 : 0.0);
+  const double freedom = static_cast<double>(ROWS * used.size()) - DOF + problem.knownUnknowns();
   ErrorModel best;
   double best_likelihood = -ENDLESS;
   for (int trial = 0; trial < TRIALS; ++trial)
   {
     ErrorModel model;
     model.ratio = LEAST * std::pow(STEP, trial);
-    NormalEquations equations(problem.distanceWeight());
+    NormalEquations equations(problem);
     double squares = 0.0;
     double logarithms = 0.0;
     for (std::size_t k = 0; k < used.size(); ++k)

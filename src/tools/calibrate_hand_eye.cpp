@@ -47,6 +47,8 @@ public:
     line.number("distance", distance, { 0.01, 100.0 },
                 "of the plane from the camera where the view was stored, measured square to the plane [m]; without, it "
                 "follows from the arm's motion");
+    line.flag("focal-length", params.finds_focal_length,
+              "Find out, too, by which factor camera_info has the focal lengths wrong; wants more motion");
     addFileOptions(line, options);
     if (!readCalibrationOptions(line, argc, argv, options))
     {
@@ -109,8 +111,13 @@ public:
 
   std::string describePose(const Result& result) const
   {
+    const std::string focal_length =
+        params.finds_focal_length ? "focal lengths: " + fixed({ result.focal_scale }, 4) +
+                                        " times those of camera_info (standard deviation " +
+                                        fixed({ result.focal_sigma }, 4) + "); correct the camera's calibration by it\n"
+                                  : "";
     return "standard deviation, along the least certain direction: " + fixed({ 1e3 * result.translationSigma() }, 2) +
-           " mm, " + fixed({ DEGREES * result.rotationSigma() }, 3) + " degrees\n";
+           " mm, " + fixed({ DEGREES * result.rotationSigma() }, 3) + " degrees\n" + focal_length;
   }
 
   static Eigen::Isometry3d cameraOf(const Result& result)

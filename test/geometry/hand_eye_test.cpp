@@ -329,6 +329,66 @@ TEST(HandEye, TakesAKnownDistance)
   EXPECT_THROW(calibrateHandEye(scene.view, poses, params), std::invalid_argument);
 }
 
+RC_GTEST_PROP(HandEye, FindsTheFocalLengthWhenAsked, (std::uint64_t seed))
+{
+  Scene scene(seed);
+  const std::vector<HandEyePose> poses = scene.poses(14);
+  const double scale = uniform(scene.rng, 0.93, 1.07);
+  scene.view.k(0, 0) /= scale;
+  scene.view.k(1, 1) /= scale;
+  HandEyeParams params;
+  params.finds_focal_length = true;
+  const HandEyeResult result = calibrateHandEye(scene.view, poses, params);
+  RC_ASSERT(result.found);
+  RC_ASSERT(used(result) == 14);
+  RC_ASSERT(std::abs(result.focal_scale - scale) < 1e-6);
+  RC_ASSERT(scene.millimetres(result) < 1e-3);
+  RC_ASSERT(scene.degrees(result) < 1e-4);
+  for (const HandEyeResidual& residual : result.residuals)
+  {
+    RC_ASSERT(residual.translation < 1e-6);
+  }
+}
+
+TEST(HandEye, TellsHowCertainTheFocalLengthIs)
+{
+  constexpr int RUNS = 40;
+  constexpr double WRONG = 1.02;  // camera_info has it 2 % too long
+  double squares = 0.0;
+  int better = 0;
+  for (int run = 0; run < RUNS; ++run)
+  {
+    Scene scene(static_cast<std::uint64_t>(run));
+    const std::vector<HandEyePose> poses = scene.poses(14, { 0.2, 2e-4, 1e-4 });
+    scene.view.k(0, 0) *= WRONG;
+    scene.view.k(1, 1) *= WRONG;
+    HandEyeParams params;
+    const HandEyeResult as_told = calibrateHandEye(scene.view, poses, params);
+    params.finds_focal_length = true;
+    const HandEyeResult found = calibrateHandEye(scene.view, poses, params);
+    ASSERT_TRUE(found.found) << found.message;
+    EXPECT_NEAR(found.focal_scale, 1.0 / WRONG, 0.01);
+    const double error = (found.focal_scale - 1.0 / WRONG) / found.focal_sigma;
+    squares += error * error;
+    better += !as_told.found || scene.millimetres(found) < scene.millimetres(as_told) ? 1 : 0;
+    EXPECT_EQ(as_told.focal_scale, 1.0);
+  }
+  EXPECT_GT(std::sqrt(squares / RUNS), 0.5);
+  EXPECT_LT(std::sqrt(squares / RUNS), 2.0);
+  EXPECT_GE(better, RUNS * 8 / 10);
+}
+
+TEST(HandEye, SaysWhenThePosesDoNotTellTheFocalLength)
+{
+  Scene scene(3);
+  const std::vector<HandEyePose> poses = scene.poses(10, { 2.0, 2e-3, 1e-3 });
+  HandEyeParams params;
+  params.finds_focal_length = true;
+  const HandEyeResult result = calibrateHandEye(scene.view, poses, params);
+  EXPECT_FALSE(result.found);
+  EXPECT_TRUE(names(result, "focal length")) << result.message;
+}
+
 TEST(HandEye, RefusesWhatItDoesNotKnowWellEnough)
 {
   Scene scene(8);

@@ -42,6 +42,9 @@ struct HandEyeParams
   double min_travel = 0.15;          ///< least way of the camera between two poses, as a part of the plane's distance
   double max_translation_sigma = 0.005;  ///< largest standard deviation of the camera's place, in any direction [m]
   double max_rotation_sigma = 0.0175;    ///< largest standard deviation of its orientation, about any axis [rad]
+  /** Whether the focal length is to be found, too: both focal lengths of HandEyeView::k are off by one factor. */
+  bool finds_focal_length = false;
+  double max_focal_sigma = 0.005;  ///< largest standard deviation of that factor, when it is to be found
   /**
    * Distance of the plane from the view's camera, along its normal, where somebody has measured it [m]; NaN: unknown.
    */
@@ -87,6 +90,8 @@ struct HandEyeResult
   Eigen::Vector3d normal = Eigen::Vector3d::UnitZ();  ///< unit, of the plane in the view's camera frame, away from it
   double distance = 0.0;                              ///< of the plane from the view's camera [m]
   double distance_sigma = 0.0;                        ///< standard deviation of `distance` [m]
+  double focal_scale = 1.0;  ///< true focal lengths over those of HandEyeView::k; 1 unless it was to be found
+  double focal_sigma = 0.0;  ///< standard deviation of `focal_scale`
   double image_error = 0.0;  ///< standard deviation of a corner's coordinate, as the residuals have it [px]
   /** Standard deviation of the arm's rotation about each axis, as the residuals have it [rad]. */
   double rotation_error = 0.0;
@@ -114,7 +119,8 @@ std::vector<std::string> missingMotion(const HandEyeMotion& motion, const HandEy
  * The pose of the camera on the flange: from AX = XB by cv::calibrateHandEye (Horaud & Dornaika 1995) over triples of
  * poses, then refined together with the view's pose, and the plane's direction and distance, as errors of the view's
  * corners in the images. The errors of arm and image are told apart by restricted maximum likelihood, so that each
- * weighs as it should. Poses that contradict most others are left out.
+ * weighs as it should. Poses that contradict most others are left out. With `finds_focal_length` a factor of the focal
+ * lengths is one more unknown, and residuals are those of the camera matrix with it.
  *
  * Does the same for poses in another order. Nothing is found when motion is lacking, when fewer than half of the poses
  * agree, or when the result is less certain than asked for.
