@@ -5,11 +5,14 @@
 #include "view_servo/geometry/rotation_vector.h"
 
 #include <algorithm>
+#include <limits>
 
 namespace view_servo
 {
 namespace
 {
+constexpr double NEVER = std::numeric_limits<double>::infinity();
+
 /**
  * How far a motion that is seen goes along one that is known, as a part of the latter; neither has to be exact in
  * length.
@@ -24,6 +27,11 @@ void PlaceWatch::restart(const Eigen::Isometry3d& place)
 {
   last_.reset();
   believed_ = place;
+}
+
+void PlaceWatch::interrupt()
+{
+  interrupted_ = true;
 }
 
 Eigen::Isometry3d PlaceWatch::placeOf(const Sight& sight, double unit)
@@ -52,9 +60,23 @@ PlaceWatch::Verdict PlaceWatch::judge(const Sight& from, const Sight& to, double
   return alike ? Verdict::ALIKE : Verdict::OTHERWISE;
 }
 
+void PlaceWatch::Doubt::add(double moved, Verdict verdict, double limit, const Sight& now)
+{
+  length += moved;
+  if (verdict != Verdict::OPEN)
+  {
+    length = verdict == Verdict::ALIKE ? 0.0 : length;
+    contradicted = length >= limit;
+    from = now;
+  }
+}
+
 void PlaceWatch::add(const Eigen::Isometry3d& camera, const Eigen::Isometry3d& view_in_camera, double unit)
 {
   constexpr double BY_RANGE = 0.05;  // part of the distance of the view by which its place may change
+  // Part of the camera's way since the last sight by which it may, too, as the unit is not known well. Not by all of it
+  // where nothing was seen meanwhile: a picture that appears while the camera brakes is as far ahead as that way.
+  const double by_step = interrupted_ ? 0.3 : 1.0;
   const Sight now{ camera, view_in_camera };
   const Eigen::Isometry3d place = placeOf(now, unit);
   const Eigen::Isometry3d step = last_ ? last_->camera.inverse() * camera : Eigen::Isometry3d::Identity();
@@ -64,35 +86,33 @@ void PlaceWatch::add(const Eigen::Isometry3d& camera, const Eigen::Isometry3d& v
   // A place far away is known less exactly.
   const double range = unit * std::min(view_in_camera.translation().norm(),
                                        (last_ ? last_->view_in_camera : view_in_camera).translation().norm());
-  const bool jumped = change.translation().norm() > limits_.jump + step.translation().norm() + BY_RANGE * range ||
-                      rotationVector(change.linear()).norm() > limits_.jump_turn + rotationVector(step.linear()).norm();
+  const bool jumped =
+      change.translation().norm() > limits_.jump + by_step * step.translation().norm() + BY_RANGE * range ||
+      rotationVector(change.linear()).norm() > limits_.jump_turn + by_step * rotationVector(step.linear()).norm();
+  interrupted_ = false;
   if (jumped)
   {
     trusted_ = false;
-    contradicted_ = contradicted_ && !last_;  // the picture has changed, unless only its measure has
+    // The picture has changed, unless only its measure has.
+    doubtful_way_.contradicted = doubtful_way_.contradicted && !last_;
+    doubtful_turn_.contradicted = doubtful_turn_.contradicted && !last_;
   }
   if (jumped || !last_)
   {
-    proof_from_ = doubt_from_ = now;
+    proof_from_ = doubtful_way_.from = doubtful_turn_.from = now;
   }
   last_ = now;
-  if (const Verdict verdict = judge(*proof_from_, now, limits_.proof, limits_.proof_turn); verdict != Verdict::OPEN)
+  if (const Verdict verdict = judge(proof_from_, now, limits_.proof, limits_.proof_turn); verdict != Verdict::OPEN)
   {
     trusted_ = verdict == Verdict::ALIKE;
     proof_from_ = now;
   }
-  doubtful_way_ += step.translation().norm();
-  doubtful_turn_ += rotationVector(step.linear()).norm();
-  if (const Verdict verdict = judge(*doubt_from_, now, limits_.doubt / 2.0, limits_.doubt_turn / 2.0);
-      verdict != Verdict::OPEN)
-  {
-    if (verdict == Verdict::ALIKE)
-    {
-      doubtful_way_ = doubtful_turn_ = 0.0;
-    }
-    contradicted_ = doubtful_way_ >= limits_.doubt || doubtful_turn_ >= limits_.doubt_turn;
-    doubt_from_ = now;
-  }
+  // Each by itself: a picture that is turned round turns about the camera's axis as the camera does, but goes the other
+  // way.
+  doubtful_way_.add(step.translation().norm(), judge(doubtful_way_.from, now, limits_.doubt / 2.0, NEVER),
+                    limits_.doubt, now);
+  doubtful_turn_.add(rotationVector(step.linear()).norm(),
+                     judge(doubtful_turn_.from, now, NEVER, limits_.doubt_turn / 2.0), limits_.doubt_turn, now);
 }
 
 }  // namespace view_servo

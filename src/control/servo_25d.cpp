@@ -239,6 +239,7 @@ void Servo25d::addLoss(double stamp, const std::string& reason)
   {
     return;
   }
+  watch_.interrupt();
   if (stamp - *lost_since_ > params_.lost_timeout)
   {
     report_.state = ServoState::FAILED;

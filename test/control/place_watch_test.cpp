@@ -92,6 +92,28 @@ TEST(PlaceWatch, DoesNotTrustAPictureHeldBeforeACameraThatStops)
   }
 }
 
+TEST(PlaceWatch, DoesNotTrustAPictureThatAppearsWhileTheCameraBrakesUnseen)
+{
+  PlaceWatch watch(LIMITS);
+  approach(watch, -0.1, 1.0);
+  ASSERT_TRUE(watch.trusted());
+  watch.interrupt();
+  for (int i = 0; i < 20; ++i)
+  {
+    watch.add(at(-0.04 + 1e-3 * i, 0.0, -0.012), HERE, 1.0);
+    EXPECT_FALSE(watch.trusted());
+  }
+}
+
+TEST(PlaceWatch, TrustsTheViewThatIsSeenAgainAfterTheCameraHasMovedUnseen)
+{
+  PlaceWatch watch(LIMITS);
+  approach(watch, -0.1, 1.0);
+  watch.interrupt();
+  watch.add(at(-0.04, 0.0, -0.012), at(-0.04, 0.0, -0.012).inverse(), 1.0);
+  EXPECT_TRUE(watch.trusted());
+}
+
 TEST(PlaceWatch, TrustsAgainAfterTheCameraHasMovedBeforeTheView)
 {
   PlaceWatch watch(LIMITS);
@@ -121,6 +143,18 @@ TEST(PlaceWatch, IsContradictedByAPictureThatStaysOrGoesTheOtherWay)
     EXPECT_FALSE(ahead.trusted());
     EXPECT_FALSE(turning.trusted());
   }
+}
+
+TEST(PlaceWatch, IsContradictedByAPictureThatIsTurnedRoundHoweverItTurns)
+{
+  const Eigen::Isometry3d round(Eigen::AngleAxisd(M_PI, Eigen::Vector3d::UnitZ()));
+  PlaceWatch watch(LIMITS);
+  for (double moved = 0.0; moved < 0.4; moved += 0.01)
+  {
+    const Eigen::Isometry3d camera = at(moved, 0.0, 2.0 * moved);
+    watch.add(camera, (camera * round).inverse() * at(1.0, 0.2, 0.0), 1.0);
+  }
+  EXPECT_TRUE(watch.contradicted());
 }
 
 TEST(PlaceWatch, ForgetsTheContradictionWhenTheViewIsSeenElsewhere)

@@ -432,6 +432,28 @@ TEST_F(Servo25dCopiesTest, IsNotDeceivedByAPictureOfTheViewHeldBefore)
   }
 }
 
+TEST_F(Servo25dCopiesTest, IsNotDeceivedByAPictureThatComesWhileItBrakesUnseen)
+{
+  for (const double begin : { 0.4, 0.8, 1.2 })
+  {
+    Plant plant = start();
+    run(plant, begin);
+    plant.visible = false;
+    for (double unseen = 0.0; unseen < 0.4; unseen += Plant::CONTROL)
+    {
+      plant.step();
+      plant.servo.addLoss(plant.time() - Plant::DELAY, "covered");
+    }
+    plant.visible = true;
+    plant.shown = [](const Eigen::Isometry3d&) {
+      return Eigen::Isometry3d(Eigen::Isometry3d::Identity());
+    };
+    run(plant, 20.0);
+    EXPECT_EQ(plant.servo.report().state, ServoState::FAILED)
+        << begin << ": " << plant.camera().translation().norm() << " m off, " << plant.servo.report().reason;
+  }
+}
+
 TEST_F(Servo25dCopiesTest, ConvergesWhenThePictureIsTakenAway)
 {
   for (const double begin : { 0.3, 1.5 })

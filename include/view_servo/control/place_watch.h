@@ -46,6 +46,9 @@ public:
    */
   void restart(const Eigen::Isometry3d& place);
 
+  /** The view is not seen, for so long that the camera may have moved far before the next sight. */
+  void interrupt();
+
   /**
    * Whether the view may be taken for reached. False from the moment when its place jumps, or when it does not move as
    * the camera does, until the camera has moved before it and it does. True before the first sight: a camera may be at
@@ -61,7 +64,7 @@ public:
    */
   bool contradicted() const
   {
-    return contradicted_;
+    return doubtful_way_.contradicted || doubtful_turn_.contradicted;
   }
 
 private:
@@ -77,6 +80,17 @@ private:
     OTHERWISE
   };
 
+  /** The camera's way, or its turn, since the view has last been seen to move as it does. */
+  struct Doubt
+  {
+    Sight from;           // of the stretch that is judged next
+    double length = 0.0;  // [m] or [rad]
+    bool contradicted = false;
+
+    /** @param verdict on the stretch from `from` to `now`. @param limit from which length on it is contradicted. */
+    void add(double moved, Verdict verdict, double limit, const Sight& now);
+  };
+
   /** Of the view, in the frame of `camera` [m]. */
   static Eigen::Isometry3d placeOf(const Sight& sight, double unit);
   /**
@@ -86,14 +100,13 @@ private:
   static Verdict judge(const Sight& from, const Sight& to, double way, double turn);
 
   PlaceWatchLimits limits_;
-  std::optional<Sight> last_;                  // empty at first, and after restart()
-  std::optional<Sight> proof_from_;            // empty at first
-  std::optional<Sight> doubt_from_;            // empty at first
+  std::optional<Sight> last_;  // empty at first, and after restart()
+  Sight proof_from_;
   std::optional<Eigen::Isometry3d> believed_;  // by restart()
   bool trusted_ = true;
-  bool contradicted_ = false;
-  double doubtful_way_ = 0.0;   // of the camera, since the view has last been seen to move as it does [m]
-  double doubtful_turn_ = 0.0;  // the same [rad]
+  bool interrupted_ = false;
+  Doubt doubtful_way_;
+  Doubt doubtful_turn_;
 };
 
 }  // namespace view_servo
