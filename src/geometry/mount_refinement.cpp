@@ -22,14 +22,14 @@ using hand_eye::ROWS;
 Eigen::MatrixXd onFloor(const Eigen::MatrixXd& by_state, const Eigen::MatrixXd& by_arm)
 {
   Eigen::MatrixXd columns(ROWS, SHARED + PER_POSE);
-  columns << by_state.leftCols(2), by_state.rightCols(SHARED - 2), by_arm.leftCols(2), by_arm.rightCols(1);
+  columns << by_state.leftCols(2), by_state.middleCols(3, SHARED - 2), by_arm.leftCols(2), by_arm.rightCols(1);
   return columns;
 }
 
 hand_eye::State movedState(const hand_eye::State& state, const Eigen::VectorXd& step)
 {
   Eigen::VectorXd all(hand_eye::DOF);
-  all << step.head(2), 0.0, step.segment(2, SHARED - 2);
+  all << step.head(2), 0.0, step.segment(2, SHARED - 2), 0.0;
   return hand_eye::moved(state, all);
 }
 

@@ -2,6 +2,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "view_servo/tracking/plane_filter.h"
 
+#include "view_servo/geometry/rotation_vector.h"
 #include "view_servo/parameters/faults.h"
 
 #include <Eigen/LU>
@@ -55,7 +56,42 @@ void PlaneFilter::add(const std::optional<Eigen::Isometry3d>& camera_in_odom, co
     return;
   }
   followNormals(decomposeHomography(h, k, seen));  // none, as a rule, where the views agree
-  remember({ camera_in_odom, calibrated });
+  const Measurement measurement{ camera_in_odom, calibrated };
+  if (camera_in_odom && !measurements_.empty() && measurements_.back().camera_in_odom)
+  {
+    const Measurement& last = measurements_.back();
+    if (!agrees(measurement, averaged_, *last.camera_in_odom))
+    {
+      if (!odd_ || !agrees(measurement, motionBefore(odd_->calibrated, normal()), *odd_->camera_in_odom))
+      {
+        odd_ = measurement;
+        estimate_ = estimateOf(measurement);
+        return;
+      }
+      measurements_.assign(1, *odd_);
+      places_.assign(1, *odd_);
+    }
+  }
+  odd_.reset();
+  remember(measurement);
+  average();
+}
+
+bool PlaneFilter::agrees(const Measurement& measurement, const EuclideanHomography& motion,
+                         const Eigen::Isometry3d& camera_in_odom) const
+{
+  // Where the camera is mounted, and how far away the plane is, is not exact.
+  constexpr double LEAST_ROTATION = 0.04;     // [rad]
+  constexpr double LEAST_TRANSLATION = 0.06;  // of d
+  constexpr double SCATTERS = 5.0;
+  const Eigen::Isometry3d moved = measurement.camera_in_odom->inverse() * camera_in_odom;
+  const std::optional<double> known = distance();
+  const EuclideanHomography expected = movedOn(motion, moved, known.value_or(std::numeric_limits<double>::infinity()));
+  const EuclideanHomography seen = motionBefore(measurement.calibrated, normal());
+  const double turn = rotationVector(expected.rotation.transpose() * seen.rotation).norm();
+  const double way = (expected.translation_over_distance - seen.translation_over_distance).norm();
+  return turn <= std::max(LEAST_ROTATION, SCATTERS * rotation_scatter_) &&
+         (!known || way <= std::max(LEAST_TRANSLATION, SCATTERS * translation_scatter_));
 }
 
 void PlaneFilter::followNormals(const std::vector<EuclideanHomography>& solutions)
@@ -198,39 +234,51 @@ std::optional<double> PlaneFilter::distance() const
   return squared_way / change_by_way;
 }
 
-std::optional<PlaneEstimate> PlaneFilter::estimate() const
+PlaneEstimate PlaneFilter::estimateOf(const Measurement& last) const
 {
-  if (measurements_.empty())
-  {
-    return std::nullopt;
-  }
   PlaneEstimate result;
   result.normal_known = !tracks_.empty();
   result.ambiguous = tracks_.size() > 1;
   result.distance = distance();
-  const Measurement& last = measurements_.back();
   result.motion = motionBefore(last.calibrated, normal());
-  if (!last.camera_in_odom)
-  {
-    return result;
-  }
-  Eigen::Matrix3d rotations = Eigen::Matrix3d::Zero();
-  Eigen::Vector3d translations = Eigen::Vector3d::Zero();
-  for (const Measurement& measurement : measurements_)
-  {
-    const Eigen::Isometry3d moved = last.camera_in_odom->inverse() * *measurement.camera_in_odom;
-    const EuclideanHomography now = movedOn(motionBefore(measurement.calibrated, normal()), moved,
-                                            result.distance.value_or(std::numeric_limits<double>::infinity()));
-    rotations += now.rotation;
-    translations += now.translation_over_distance / static_cast<double>(measurements_.size());
-  }
-  result.motion.rotation = nearestRotation(rotations);
-  // Without a distance, odometry does not tell how far the others have to be moved.
-  if (result.distance)
-  {
-    result.motion.translation_over_distance = translations;
-  }
   return result;
+}
+
+void PlaneFilter::average()
+{
+  const Measurement& last = measurements_.back();
+  PlaneEstimate result = estimateOf(last);
+  rotation_scatter_ = translation_scatter_ = 0.0;
+  if (last.camera_in_odom)
+  {
+    const auto count = static_cast<double>(measurements_.size());
+    Eigen::Matrix3d rotations = Eigen::Matrix3d::Zero();
+    Eigen::Vector3d translations = Eigen::Vector3d::Zero();
+    std::vector<EuclideanHomography> motions;
+    for (const Measurement& measurement : measurements_)
+    {
+      const Eigen::Isometry3d moved = last.camera_in_odom->inverse() * *measurement.camera_in_odom;
+      motions.push_back(movedOn(motionBefore(measurement.calibrated, normal()), moved,
+                                result.distance.value_or(std::numeric_limits<double>::infinity())));
+      rotations += motions.back().rotation;
+      translations += motions.back().translation_over_distance / count;
+    }
+    result.motion.rotation = nearestRotation(rotations);
+    for (const EuclideanHomography& motion : motions)
+    {
+      rotation_scatter_ += rotationVector(result.motion.rotation.transpose() * motion.rotation).squaredNorm() / count;
+      translation_scatter_ += (motion.translation_over_distance - translations).squaredNorm() / count;
+    }
+    rotation_scatter_ = std::sqrt(rotation_scatter_);
+    translation_scatter_ = std::sqrt(translation_scatter_);
+    // Without a distance, odometry does not tell how far the others have to be moved.
+    if (result.distance)
+    {
+      result.motion.translation_over_distance = translations;
+    }
+  }
+  averaged_ = result.motion;
+  estimate_ = result;
 }
 
 }  // namespace view_servo

@@ -228,6 +228,50 @@ TEST(PlaneFilter, DoesWithoutOdometry)
   EXPECT_LT(rotationError(estimate->motion.rotation, approach.truth(0.75).rotation), 0.3 * DEGREE);
 }
 
+double angleBetween(const Eigen::Matrix3d& a, const Eigen::Matrix3d& b)
+{
+  return Eigen::AngleAxisd(a.transpose() * b).angle();
+}
+
+// A picture of the view is held before the camera: to average it with what was seen before says that the camera turns.
+TEST(PlaneFilter, BeginsAnewWhenSomethingElseIsSeen)
+{
+  Approach approach(3);
+  PlaneFilter filter{ PlaneFilterParams() };
+  for (int i = 0; i <= 30; ++i)
+  {
+    approach.addTo(filter, 0.01 * i, 0.3);
+  }
+  for (int i = 1; i <= 10; ++i)
+  {
+    filter.add(approach.cameraInOdom(0.3 + 0.01 * i), approach.measure(1.0, 0.3), FILTERED_K, approach.points());
+    EXPECT_LT(angleBetween(filter.estimate()->motion.rotation, Eigen::Matrix3d::Identity()), 0.9 * DEGREE) << i;
+    EXPECT_LT(filter.estimate()->motion.translation_over_distance.norm(), 0.01) << i;
+  }
+}
+
+TEST(PlaneFilter, LeavesOutASingleMeasurementThatContradictsTheOthers)
+{
+  Approach approach(4);
+  PlaneFilter filter{ PlaneFilterParams() };
+  PlaneFilter undisturbed{ PlaneFilterParams() };
+  for (int i = 0; i <= 60; ++i)
+  {
+    const Eigen::Matrix3d h = approach.measure(0.01 * i, 0.3);
+    if (i % 10 == 9)
+    {
+      filter.add(approach.cameraInOdom(0.01 * i), approach.measure(1.0, 0.3), FILTERED_K, approach.points());
+    }
+    filter.add(approach.cameraInOdom(0.01 * i), h, FILTERED_K, approach.points());
+    undisturbed.add(approach.cameraInOdom(0.01 * i), h, FILTERED_K, approach.points());
+    if (i > 20)
+    {
+      EXPECT_LT(angleBetween(filter.estimate()->motion.rotation, undisturbed.estimate()->motion.rotation), 1e-6) << i;
+      EXPECT_EQ(filter.estimate()->distance.has_value(), undisturbed.estimate()->distance.has_value()) << i;
+    }
+  }
+}
+
 TEST(PlaneFilter, StaysAmbiguousWhereNothingTells)
 {
   // Two decompositions at one place: their normals do not move.

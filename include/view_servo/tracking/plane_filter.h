@@ -61,6 +61,9 @@ struct PlaneEstimate
  * Where a homography has two decompositions, the filter follows both by their normals. The true normal stays the same
  * in the reference frame; the other one wanders as the camera moves. A decomposition whose normals scatter clearly
  * more, or that is not seen any more, is dropped for good. Until then the estimate is marked as ambiguous.
+ *
+ * A measurement that contradicts the average, as odometry moves it, is not averaged with it. If the next one agrees
+ * with it, what is seen has been moved, or is another thing, and the average begins anew with these two.
  */
 class PlaneFilter
 {
@@ -78,7 +81,10 @@ public:
            const Points& seen);
 
   /** Empty before the first measurement. */
-  std::optional<PlaneEstimate> estimate() const;
+  const std::optional<PlaneEstimate>& estimate() const
+  {
+    return estimate_;
+  }
 
 private:
   struct Measurement
@@ -105,6 +111,13 @@ private:
 
   void followNormals(const std::vector<EuclideanHomography>& solutions);
   void remember(const Measurement& measurement);
+  /** The average, as of the last measurement. */
+  void average();
+  /** What the last measurement alone says, and what is known of the plane. */
+  PlaneEstimate estimateOf(const Measurement& last) const;
+  /** Whether a measurement is where odometry moves a motion that was seen at another pose of the camera. */
+  bool agrees(const Measurement& measurement, const EuclideanHomography& motion,
+              const Eigen::Isometry3d& camera_in_odom) const;
   /** The plane's normal in the reference camera's frame; the optical axis while it is not known. */
   Eigen::Vector3d normal() const;
   std::optional<double> distance() const;
@@ -113,6 +126,11 @@ private:
   std::vector<Track> tracks_;             // none, one or two; the likelier first
   std::deque<Measurement> measurements_;  // of the window, newest last
   std::deque<Measurement> places_;        // apart from each other, also when the camera stands; newest last
+  std::optional<Measurement> odd_;        // the last one, where it contradicts those
+  std::optional<PlaneEstimate> estimate_;
+  EuclideanHomography averaged_;      // motion of the average, without the odd one
+  double rotation_scatter_ = 0.0;     // rms angle of the measurements from their mean [rad]
+  double translation_scatter_ = 0.0;  // the same of t/d, where the distance is known
 };
 
 }  // namespace view_servo
