@@ -93,9 +93,12 @@ void PlaceWatch::add(const Eigen::Isometry3d& camera, const Eigen::Isometry3d& v
   if (jumped)
   {
     trusted_ = false;
-    // The picture has changed, unless only its measure has.
-    doubtful_way_.contradicted = doubtful_way_.contradicted && !last_;
-    doubtful_turn_.contradicted = doubtful_turn_.contradicted && !last_;
+    // The picture has changed, unless only its measure has, or what was averaged before the camera stopped.
+    const bool elsewhere =
+        change.translation().norm() > limits_.doubt || rotationVector(change.linear()).norm() > limits_.doubt_turn;
+    const bool forgotten = last_.has_value() && elsewhere;
+    doubtful_way_.contradicted = doubtful_way_.contradicted && !forgotten;
+    doubtful_turn_.contradicted = doubtful_turn_.contradicted && !forgotten;
   }
   if (jumped || !last_)
   {

@@ -165,6 +165,8 @@ TEST(PlaceWatch, ForgetsTheContradictionWhenTheViewIsSeenElsewhere)
     watch.add(at(x, 0.0, 0.0), at(1.0, 0.0, 0.0), 1.0);
   }
   ASSERT_TRUE(watch.contradicted());
+  watch.add(at(0.3, 0.0, 0.0), at(1.05, 0.0, 0.0), 1.0);
+  EXPECT_TRUE(watch.contradicted()) << "what is seen has hardly changed";
   watch.add(at(0.3, 0.0, 0.0), at(0.7, 0.0, 0.0), 1.0);
   EXPECT_FALSE(watch.contradicted());
 }
