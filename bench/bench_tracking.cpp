@@ -587,7 +587,7 @@ public:
   Eigen::Matrix3d find(const cv::Mat& frame)
   {
     constexpr double LEAST_CORRELATION = 0.9;
-    const Eigen::Matrix3d unknown = Eigen::Matrix3d::Constant(std::nan(""));
+    Eigen::Matrix3d unknown = Eigen::Matrix3d::Constant(std::nan(""));
     cv::Mat h = byKeyPoints(frame);
     if (h.empty())
     {
