@@ -5,6 +5,7 @@
 #include <chrono>
 #include <cstdio>
 #include <cstdlib>  // says whether this is glibc
+#include <iostream>
 #include <optional>
 #include <sstream>
 #include <utility>
@@ -116,6 +117,28 @@ void keepFreedMemory()
   mallopt(M_MMAP_THRESHOLD, LARGEST_BLOCK);
   mallopt(M_TRIM_THRESHOLD, KEPT);
 #endif
+}
+
+std::optional<int> answerCommandLine(int argc, char** argv, const std::string& name)
+{
+  for (int i = 1; i < argc; ++i)
+  {
+    const std::string word = argv[i];
+    if (word == "--help" || word == "-h")
+    {
+      std::cout << "Usage: rosrun view_servo " << name << " [_PARAMETER:=VALUE ...] [NAME:=OTHER_NAME ...]\n\n"
+                << "A ROS node, which needs a master: roscore, or a launch file, starts one. Its topics, services and\n"
+                << "parameters are in docs/nodes.md; roslaunch view_servo, and the tab key, name the launch files.\n";
+      return 0;
+    }
+    if (word.find(":=") == std::string::npos)
+    {
+      std::cerr << name << ": '" << word << "' is not understood: parameters are set by _NAME:=VALUE; see --help"
+                << std::endl;
+      return 2;
+    }
+  }
+  return std::nullopt;
 }
 
 }  // namespace view_servo

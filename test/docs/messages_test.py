@@ -137,6 +137,7 @@ NOT_FOR_USERS = {
     ],
     "it is a program's help, or says what to do next": [
         r"Listens to .*",
+        r"Usage: .*",
         r"bring the arm to .*",
         r"move the arm to another pose, .*",
         r"drive the base to .*",

@@ -90,6 +90,21 @@ INSTANTIATE_TEST_SUITE_P(Programs, OptionProgramTest,
                          testing::Values(CALIBRATE_HAND_EYE_PATH, CALIBRATE_MOUNT_PATH, CHECK_ROBOT_PATH,
                                          PICK_VIEW_PATH));
 
+class NodeTest : public testing::TestWithParam<std::string>
+{
+};
+
+TEST_P(NodeTest, AnswersHelpAndRefusesWhatIsNotOfRos)
+{
+  const ProgramRun help = runWithoutMaster(GetParam(), { "__name:=a", "--help" });
+  EXPECT_EQ(help.status, 0);
+  EXPECT_EQ(help.err, "");
+  EXPECT_NE(help.out.find("_PARAMETER:=VALUE"), std::string::npos) << help.out;
+  expectBadInput(runWithoutMaster(GetParam(), { "_rate=5" }), "'_rate=5' is not understood");
+}
+
+INSTANTIATE_TEST_SUITE_P(Nodes, NodeTest, testing::Values(POINT_MATCHER_PATH, HOMING_PATH, NOMAD_SIM_PATH));
+
 }  // namespace
 }  // namespace test
 }  // namespace view_servo

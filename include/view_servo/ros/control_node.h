@@ -141,11 +141,15 @@ private:
 
 /**
  * As runNode(), for a node that drives a robot: its `stop()`, which sends zero, is called before ROS shuts down.
- * @return 1 when the node refuses to start.
+ * @return 1 when the node refuses to start; else as answerCommandLine().
  */
 template <typename Node>
 int runControlNode(int argc, char** argv, const std::string& name)
 {
+  if (const std::optional<int> status = answerCommandLine(argc, argv, name))
+  {
+    return *status;
+  }
   const ros::WallDuration poll(0.01);
   keepFreedMemory();
   const ExitDeadline exit_deadline(&detail::shutdownRequested);

@@ -21,6 +21,7 @@
 #include <cstdint>
 #include <exception>
 #include <functional>
+#include <optional>
 #include <string>
 #include <thread>
 
@@ -207,12 +208,22 @@ private:
 constexpr std::uint32_t NODE_THREADS = 3;
 
 /**
+ * Answers a node's command line without a master when it asks for help, or has words that are none of ROS, as _rate=5.
+ * @return the exit status: 0 when help has been printed, 2 when a word is not understood; nothing when the node may run.
+ */
+std::optional<int> answerCommandLine(int argc, char** argv, const std::string& name);
+
+/**
  * A node's main(): spins on NODE_THREADS.
- * @return 1 when the node refuses to start.
+ * @return 1 when the node refuses to start; else as answerCommandLine().
  */
 template <typename Node>
 int runNode(int argc, char** argv, const std::string& name)
 {
+  if (const std::optional<int> status = answerCommandLine(argc, argv, name))
+  {
+    return *status;
+  }
   keepFreedMemory();
   ros::init(argc, argv, name);
   const ExitDeadline exit_deadline(&ros::isShuttingDown);
