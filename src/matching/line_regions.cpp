@@ -144,7 +144,81 @@ public:
     return looksAlike(region) ? std::optional<LineRegion>(std::move(region)) : std::nullopt;
   }
 
+  std::vector<double> supportFartherAway(const std::vector<LineRegion>& regions) const
+  {
+    const std::vector<Association> candidates = rankedCandidates();
+    std::vector<double> most(regions.size(), 0.0);
+    cv::parallel_for_(cv::Range(0, static_cast<int>(regions.size())), [&](const cv::Range& range) {
+      for (int i = range.start; i < range.end; ++i)
+      {
+        most[static_cast<std::size_t>(i)] = supportFartherAway(regions[static_cast<std::size_t>(i)], candidates);
+      }
+    });
+    return most;
+  }
+
 private:
+  /** Area that a homography gives to a small square of area 1 there [px^2]. */
+  static double areaOf(const Eigen::Matrix3d& h, const Eigen::Vector2d& at)
+  {
+    const Eigen::Vector2d to = transfer(h, at);
+    return std::abs(
+        cross(transfer(h, at + Eigen::Vector2d::UnitX()) - to, transfer(h, at + Eigen::Vector2d::UnitY()) - to));
+  }
+
+  double supportFartherAway(const LineRegion& region, const std::vector<Association>& candidates) const
+  {
+    constexpr int MOST_TRIED = 8;       // if much of the region is elsewhere too, then one of the strongest is
+    constexpr double ELSEWHERE = 15.0;  // nearer places are one, as the two edges of a frame are [px]
+    constexpr double SMALLER = 0.6;     // of the area
+    std::vector<int> own;
+    std::vector<char> is_own(from_.segments().size(), 0);
+    Eigen::Vector2d middle = Eigen::Vector2d::Zero();
+    for (const SegmentMatch& match : region.matches)
+    {
+      own.push_back(match.reference);
+      is_own[static_cast<std::size_t>(match.reference)] = 1;
+      middle += reference(match.reference).midpoint() / static_cast<double>(region.matches.size());
+    }
+    const auto is_elsewhere = [](const Eigen::Vector2d& a, const Eigen::Vector2d& b) {
+      return (a - b).norm() > ELSEWHERE;
+    };
+    double most = 0.0;
+    int tried = 0;
+    for (std::size_t i = 0; i < candidates.size() && tried < MOST_TRIED; ++i)
+    {
+      const auto& [row, column, weight] = candidates[i];
+      if (is_own[static_cast<std::size_t>(row)] == 0 ||
+          !is_elsewhere(transfer(region.h, reference(row).midpoint()), current(column).midpoint()))
+      {
+        continue;
+      }
+      ++tried;
+      std::optional<LineRegion> other = seed(candidates[i]);
+      if (!other)
+      {
+        continue;
+      }
+      refitUntilNothingIsGained(*other, own);
+      other->matches = agreeing(own, other->h, params_.tolerance);
+      if (!other->matches.empty() && is_elsewhere(transfer(region.h, middle), transfer(other->h, middle)) &&
+          areaOf(other->h, middle) < SMALLER * areaOf(region.h, middle))
+      {
+        looksAlike(*other);
+        most = std::max(most, other->support);
+      }
+    }
+    return most;
+  }
+
+  void refitUntilNothingIsGained(LineRegion& region, const std::vector<int>& of) const
+  {
+    constexpr int MAX_ROUNDS = 3;
+    for (int round = 0; round < MAX_ROUNDS && refit(region, of); ++round)
+    {
+    }
+  }
+
   /** Candidate matches, those first that stand out in their row and column. */
   std::vector<Association> rankedCandidates() const
   {
@@ -369,13 +443,7 @@ private:
       return std::nullopt;
     }
     region.support = 0.0;  // at the tolerance of homographies
-    for (int round = 0; round < 3; ++round)
-    {
-      if (!refit(region, near))
-      {
-        break;
-      }
-    }
+    refitUntilNothingIsGained(region, near);
     return region.support >= params_.min_support && looksAlike(region) ? std::optional<LineRegion>(std::move(region))
                                                                        : std::nullopt;
   }
@@ -531,6 +599,13 @@ std::optional<LineRegion> growLineRegion(const LineFeatures& reference, const Li
                                          const LineRegionParams& params)
 {
   return RegionFinder(reference, current, AssociationMatrix(), params).grown(h, matches);
+}
+
+std::vector<double> supportFartherAway(const LineFeatures& reference, const LineFeatures& current,
+                                       const AssociationMatrix& association, const std::vector<LineRegion>& regions,
+                                       const LineRegionParams& params)
+{
+  return RegionFinder(reference, current, association, params).supportFartherAway(regions);
 }
 
 LineEvidence& LineEvidence::operator+=(const LineEvidence& other)

@@ -76,8 +76,7 @@ public:
       for (const double down : { -REACH, 0.0, REACH })
       {
         const Eigen::Vector3d ray = world.camera.normalized(point + Eigen::Vector2d(right, down)).homogeneous();
-        const auto distance =
-            sim::firstHit(world, world.goal.translation(), world.goal.linear() * ray.normalized());
+        const auto distance = sim::firstHit(world, world.goal.translation(), world.goal.linear() * ray.normalized());
         if (distance)
         {
           least = std::min(least, std::abs(std::log(depth * ray.norm() / *distance)));

@@ -76,6 +76,16 @@ std::optional<LineRegion> growLineRegion(const LineFeatures& reference, const Li
                                          const Eigen::Matrix3d& h, const std::vector<SegmentMatch>& matches,
                                          const LineRegionParams& params);
 
+/**
+ * What each region's segments support at the best other place where they would be farther away, at less than 0.6 of the
+ * area. A region that has much of its support there, too, may be either: of doors along a corridor the nearest shows
+ * most segments, so that most are found there, whichever door it was.
+ * @return LineRegion::support of the region's segments there, of each region; 0 where there is no such place.
+ */
+std::vector<double> supportFartherAway(const LineFeatures& reference, const LineFeatures& current,
+                                       const AssociationMatrix& association, const std::vector<LineRegion>& regions,
+                                       const LineRegionParams& params);
+
 /** Directions in the current image that evidenceOf() tells apart: 45 degrees apart, along u first, then towards v. */
 constexpr std::size_t LINE_DIRECTIONS = 4;
 
