@@ -387,8 +387,9 @@ void printRow(const std::string& name, const std::string& segments, const std::v
   std::printf("\n");
 }
 
-int runTime(const std::filesystem::path& data, LineMatcherParams params, int runs)
+Ratios runTime(const std::filesystem::path& data, LineMatcherParams params, int runs)
 {
+  Ratios all;
   const cv::Size size(640, 480);
   params.segments.max_segments = MOST_SEGMENTS;
   const LineViewMatcher matcher(params);
@@ -426,8 +427,14 @@ int runTime(const std::filesystem::path& data, LineMatcherParams params, int run
       ratios.push_back(sums[i] / sums[2 + i % 2]);
     }
     printRow("of LSD+LBD", "", ratios, 2);
+    for (std::size_t peer = 2; peer < sums.size(); ++peer)
+    {
+      all.add((peer % 2 == 0 ? "fresh, " : "stored, ") + std::to_string(threads) +
+                  (threads == 1 ? " thread, of " : " threads, of ") + timings[peer / 2].name,
+              sums[peer % 2] / sums[peer]);
+    }
   }
-  return 0;
+  return all;
 }
 
 }  // namespace
@@ -445,6 +452,7 @@ int main(int argc, char** argv)
       return 2;
     }
     const std::string& mode = options.mode;
+    requireNoRatios(options, mode != "time");
     if (mode == "benchmark")
     {
       return runBenchmark(*data, LineViewMatcher(params));
@@ -459,9 +467,11 @@ int main(int argc, char** argv)
     }
     if (mode == "time")
     {
-      return runTime(*data, params, options.runs);
+      return finish(runTime(*data, params, options.runs), options);
     }
-    std::cerr << "usage: bench_lines benchmark|roll|merton|time [--runs N] [--set name=value ...]" << std::endl;
+    std::cerr << "usage: bench_lines benchmark|roll|merton [--set name=value ...]\n"
+                 "       bench_lines time [--runs N] [--write FILE] [--check FILE] [--set name=value ...]"
+              << std::endl;
   }
   catch (const std::exception& error)
   {

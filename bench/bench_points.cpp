@@ -4,7 +4,8 @@
 /** @file
  * Point matching against OpenCV's SIFT, AKAZE and ORB, in one run on the same images:
  *
- *     bench_points oxford|tilt|time [--runs N] [--set name=value ...]
+ *     bench_points oxford|tilt|memory [--set name=value ...]
+ *     bench_points time [--runs N] [--write FILE] [--check FILE] [--set name=value ...]
  *
  * - oxford: the sequences in the folder oxford_affine of VIEW_SERVO_DATA, image 1 against 2 .. 6. Solved means a mean
  *   error of the reference's four corners under 10 px; a match is correct within 4 px of the ground truth.
@@ -502,14 +503,15 @@ Timing timingOfOurs(const PointViewMatcherParams& params, std::vector<StageTime>
   return timing;
 }
 
-int timing(const PointViewMatcherParams& params, int runs)
+Ratios timing(const PointViewMatcherParams& params, int runs)
 {
+  Ratios ratios;
   const cv::Mat texture = loadTexture("graf1.png");
   const cv::Mat other = loadTexture("building.jpg");
   if (texture.empty() || other.empty())
   {
     std::cout << "time: skipped, opencv-doc is not installed\n";
-    return 0;
+    return ratios;
   }
   const Problem problem = tiltedPlane("graf1.png", texture, 45.0, 0, 1);
   const Problem unrelated = tiltedPlane("building.jpg", other, 0.0, 0, 1);
@@ -537,6 +539,14 @@ int timing(const PointViewMatcherParams& params, int runs)
       std::printf("%-12s%9.1f%9.1f%9.1f%18d\n", timing.name.c_str(), medianOf(timing.stored), medianOf(timing.fresh),
                   medianOf(timing.nothing), correct(timing.answer.inliers, problem.truth));
     }
+    const Timing& ours = timings.front();
+    const std::string mode = ", " + std::to_string(threads) + (threads == 1 ? " thread, of " : " threads, of ");
+    for (auto peer = timings.begin() + 1; peer != timings.end(); ++peer)
+    {
+      ratios.add("stored" + mode + peer->name, medianQuotient(ours.stored, peer->stored));
+      ratios.add("fresh" + mode + peer->name, medianQuotient(ours.fresh, peer->fresh));
+    }
+    ratios.add("nothing" + mode + "stored", medianQuotient(ours.nothing, ours.stored));
     std::printf("stages of view_servo, by the clock:\n");
     for (std::size_t i = 0; i < stages.size(); ++i)
     {
@@ -546,7 +556,7 @@ int timing(const PointViewMatcherParams& params, int runs)
       std::printf("  %-20s%7.1f\n", stages[i].name.c_str(), medianOf(ms));
     }
   }
-  return 0;
+  return ratios;
 }
 
 /** Peak memory of the process after one match [MB]; a mode of its own, as the peers need more. */
@@ -579,6 +589,7 @@ int main(int argc, char** argv)
     const BenchOptions options = readOptions(argc, argv, RUNS, parameters(params));
     cv::setNumThreads(2);
     const std::string& mode = options.mode;
+    requireNoRatios(options, mode != "time");
     if (mode == "oxford")
     {
       return oxford(params);
@@ -589,7 +600,7 @@ int main(int argc, char** argv)
     }
     if (mode == "time")
     {
-      return timing(params, options.runs);
+      return finish(timing(params, options.runs), options);
     }
     if (mode == "memory")
     {
@@ -601,6 +612,7 @@ int main(int argc, char** argv)
     std::cerr << error.what() << "\n";
     return 2;
   }
-  std::cerr << "usage: bench_points oxford|tilt|time|memory [--runs N] [--set name=value ...]\n";
+  std::cerr << "usage: bench_points oxford|tilt|memory [--set name=value ...]\n"
+               "       bench_points time [--runs N] [--write FILE] [--check FILE] [--set name=value ...]\n";
   return 2;
 }

@@ -178,8 +178,9 @@ struct Method
   std::vector<double> errors{};  ///< [px]
 };
 
-void compareAll(bool planar, const RansacParams& params, int runs, std::uint64_t seed)
+Ratios compareAll(bool planar, const RansacParams& params, int runs, std::uint64_t seed)
 {
+  Ratios ratios;
   cv::setNumThreads(1);
   std::printf("%s from %d matches, %d draws, seed %d, medians: processor time [ms], rms error [px]\n",
               planar ? "H" : "F", MATCHES, runs, static_cast<int>(seed));
@@ -208,8 +209,15 @@ void compareAll(bool planar, const RansacParams& params, int runs, std::uint64_t
                   medianOf(method.times) / medianOf(methods.front().times), medianOf(method.errors),
                   medianOf(method.errors) / medianOf(methods.front().errors));
     }
+    for (auto method = methods.begin() + 1; method != methods.end(); ++method)
+    {
+      ratios.add(std::string(planar ? "H" : "F") + " with " + std::to_string(std::lround(100.0 * outliers)) +
+                     " % outliers, " + method->name + " of " + methods.front().name,
+                 medianQuotient(method->times, methods.front().times));
+    }
     std::printf("\n");
   }
+  return ratios;
 }
 
 }  // namespace
@@ -226,10 +234,11 @@ int main(int argc, char** argv)
     const std::string& mode = options.mode;
     if (mode == "fundamental" || mode == "homography")
     {
-      compareAll(mode == "homography", params, options.runs, options.seed);
-      return 0;
+      return finish(compareAll(mode == "homography", params, options.runs, options.seed), options);
     }
-    std::cerr << "usage: bench_robust fundamental|homography [--runs N] [--seed N] [--set name=value ...]" << std::endl;
+    std::cerr << "usage: bench_robust fundamental|homography [--runs N] [--seed N] [--write FILE] [--check FILE]\n"
+                 "                                           [--set name=value ...]"
+              << std::endl;
   }
   catch (const std::exception& error)
   {

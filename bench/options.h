@@ -2,23 +2,27 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include "ratios.h"
 #include "view_servo/parameters/parameter.h"
 
 #include <algorithm>
 #include <cstddef>
 #include <cstdint>
+#include <iostream>
 #include <stdexcept>
 #include <string>
 #include <vector>
 
 namespace view_servo
 {
-/** What a benchmark is asked for: MODE [--runs N] [--seed N] [--set NAME=VALUE ...]. */
+/** What a benchmark is asked for: MODE [--runs N] [--seed N] [--write FILE] [--check FILE] [--set NAME=VALUE ...]. */
 struct BenchOptions
 {
   std::string mode;        ///< empty: none was given
   int runs = 1;            ///< at least 1
   std::uint64_t seed = 1;  ///< of what is drawn at random
+  std::string write;       ///< file for the ratios of times, see Ratios; empty: none
+  std::string check;       ///< file of ratios of an earlier run, to be compared with; empty: none
 };
 
 /**
@@ -43,6 +47,14 @@ inline BenchOptions readOptions(int argc, char** argv, int runs, const std::vect
     {
       options.seed = std::stoull(value);
     }
+    else if (arguments[i] == "--write" && !value.empty())
+    {
+      options.write = value;
+    }
+    else if (arguments[i] == "--check" && !value.empty())
+    {
+      options.check = value;
+    }
     else if (arguments[i] == "--set" && equals != std::string::npos)
     {
       setParameter(table, value.substr(0, equals), value.substr(equals + 1));
@@ -53,6 +65,31 @@ inline BenchOptions readOptions(int argc, char** argv, int runs, const std::vect
     }
   }
   return options;
+}
+
+/** @throws std::invalid_argument when ratios are asked for of something that `has_none`. */
+inline void requireNoRatios(const BenchOptions& options, bool has_none)
+{
+  if (has_none && !(options.write.empty() && options.check.empty()))
+  {
+    throw std::invalid_argument("--write and --check are for ratios of times, which '" + options.mode + "' has not");
+  }
+}
+
+/** Writes and compares the ratios as asked. @return the exit status: 1 when they are worse than those of the file. */
+inline int finish(const Ratios& ratios, const BenchOptions& options)
+{
+  if (!options.write.empty())
+  {
+    ratios.write(options.write);
+  }
+  if (options.check.empty())
+  {
+    return 0;
+  }
+  const bool good = ratios.isAsGoodAs(Ratios::read(options.check), std::cout);
+  std::cout << (good ? "no ratio is" : "some ratios are") << " more than 15 % worse than in " << options.check << '\n';
+  return good ? 0 : 1;
 }
 
 }  // namespace view_servo
