@@ -62,7 +62,7 @@ struct HomingStages
  *  - `cmd_vel` (geometry_msgs/Twist, in base_link) and `cmd_vel_stamped`, or `cmd_vel_dry` and `cmd_vel_dry_stamped`;
  *    zero for a while after each end, then nothing;
  *  - `heading` (view_servo/Heading): for each image; `heading_arrow` (geometry_msgs/PoseStamped): the same for rviz, at
- *    the base, its x axis towards the view, while there is a heading. `view_pose`
+ *    the base, its x axis towards the view, while there is a heading. `view_pose` and `base_pose`
  *    (geometry_msgs/PoseWithCovarianceStamped);
  *  - `~markers` (visualization_msgs/MarkerArray): see ViewHoming.
  * Action: `home` (view_servo/HomeToView). All views of a goal are read before anything moves. Between two of them the

@@ -4,6 +4,8 @@
 
 #include "view_servo/ros/conversions.h"
 
+#include <Eigen/Geometry>
+
 #include <array>
 #include <cmath>
 #include <cstddef>
@@ -34,6 +36,28 @@ std::uint8_t toHeadingState(const HomingReport& report)
   }
 }
 
+/** A pose on the floor. @param covariance of x, y and yaw. */
+geometry_msgs::PoseWithCovarianceStamped toPoseOnFloor(const PlanarPose& pose, const Eigen::Matrix3d& covariance,
+                                                       double stamp, const std::string& frame)
+{
+  constexpr std::size_t SIDE = 6;                         // of the message's covariance
+  const std::array<std::size_t, 3> places = { 0, 1, 5 };  // of x, y and yaw in it
+  geometry_msgs::PoseWithCovarianceStamped message;
+  message.header.stamp = toStamp(stamp);
+  message.header.frame_id = frame;
+  message.pose.pose.position.x = pose.x;
+  message.pose.pose.position.y = pose.y;
+  message.pose.pose.orientation.z = std::sin(0.5 * pose.yaw);
+  message.pose.pose.orientation.w = std::cos(0.5 * pose.yaw);
+  for (std::size_t i = 0; i < places.size(); ++i)
+  {
+    for (std::size_t k = 0; k < places.size(); ++k)
+    {
+      message.pose.covariance[SIDE * places[i] + places[k]] = covariance(static_cast<int>(i), static_cast<int>(k));
+    }
+  }
+  return message;
+}
 }  // namespace
 
 PlanarPose toPlanarPose(const nav_msgs::Odometry& message)
@@ -91,24 +115,20 @@ Heading toHeading(const HomingReport& report, const std::string& base_frame)
 
 geometry_msgs::PoseWithCovarianceStamped toViewPose(const HomingReport& report, const std::string& odom_frame)
 {
-  constexpr std::size_t SIDE = 6;                         // of the message's covariance
-  const std::array<std::size_t, 3> places = { 0, 1, 5 };  // of x, y and yaw in it
-  geometry_msgs::PoseWithCovarianceStamped message;
-  message.header.stamp = toStamp(report.stamp);
-  message.header.frame_id = odom_frame;
-  message.pose.pose.position.x = report.goal_in_odom->x;
-  message.pose.pose.position.y = report.goal_in_odom->y;
-  message.pose.pose.orientation.z = std::sin(0.5 * report.goal_in_odom->yaw);
-  message.pose.pose.orientation.w = std::cos(0.5 * report.goal_in_odom->yaw);
-  for (std::size_t i = 0; i < places.size(); ++i)
-  {
-    for (std::size_t k = 0; k < places.size(); ++k)
-    {
-      message.pose.covariance[SIDE * places[i] + places[k]] =
-          report.goal_covariance(static_cast<int>(i), static_cast<int>(k));
-    }
-  }
-  return message;
+  return toPoseOnFloor(*report.goal_in_odom, report.goal_covariance, report.stamp, odom_frame);
+}
+
+geometry_msgs::PoseWithCovarianceStamped toBasePose(const HomingReport& report, const std::string& view)
+{
+  const PlanarPose goal{ report.distance * std::cos(report.heading), report.distance * std::sin(report.heading),
+                         report.yaw_error };
+  const PlanarPose base = inverse(goal);
+  // How the base's pose at the view changes with the view's pose in odometry's frame.
+  const Eigen::Rotation2Dd odom_in_view(-report.goal_in_odom->yaw);
+  Eigen::Matrix3d jacobian = -Eigen::Matrix3d::Identity();
+  jacobian.topLeftCorner<2, 2>() = -odom_in_view.toRotationMatrix();
+  jacobian.topRightCorner<2, 1>() << base.y, -base.x;
+  return toPoseOnFloor(base, jacobian * report.goal_covariance * jacobian.transpose(), report.stamp, "view_" + view);
 }
 
 geometry_msgs::PoseStamped toHeadingArrow(const HomingReport& report, const std::string& base_frame)

@@ -17,7 +17,8 @@ BaseOutput::BaseOutput(ros::NodeHandle& nh, const std::string& command_topic, st
     stamped_commands_(nh.advertise<geometry_msgs::TwistStamped>(command_topic + "_stamped", 1)),
     headings_(nh.advertise<Heading>("heading", 5)),
     arrows_(nh.advertise<geometry_msgs::PoseStamped>("heading_arrow", 5)),
-    view_poses_(nh.advertise<geometry_msgs::PoseWithCovarianceStamped>("view_pose", 5))
+    view_poses_(nh.advertise<geometry_msgs::PoseWithCovarianceStamped>("view_pose", 5)),
+    base_poses_(nh.advertise<geometry_msgs::PoseWithCovarianceStamped>("base_pose", 5))
 {
 }
 
@@ -28,7 +29,7 @@ void BaseOutput::publish(const BaseVelocity& velocity) const
   stamped_commands_.publish(stamped);
 }
 
-void BaseOutput::publish(const HomingReport& report, const std::string& odom_frame) const
+void BaseOutput::publish(const HomingReport& report, const std::string& odom_frame, const std::string& view) const
 {
   headings_.publish(toHeading(report, base_frame_));
   if (std::isfinite(report.heading))
@@ -38,6 +39,7 @@ void BaseOutput::publish(const HomingReport& report, const std::string& odom_fra
   if (report.goal_in_odom)
   {
     view_poses_.publish(toViewPose(report, odom_frame));
+    base_poses_.publish(toBasePose(report, view));
   }
 }
 

@@ -324,7 +324,7 @@ void ViewHoming::onOutcome(const HomingOutcome& outcome)
   }
   outcomes_.accept();
   unanswered_ = outcome.frame_time;
-  output_.publish(report_, odometry_.frame());
+  output_.publish(report_, odometry_.frame(), task_->view);
   const bool ended = report_.state == HomingState::ARRIVED || report_.state == HomingState::FAILED;
   if (ended && !context_.goalRuns())
   {

@@ -407,6 +407,47 @@ TEST(BaseConversion, PutsTheViewsPoseIntoOdometrysFrame)
   EXPECT_EQ(message.pose.covariance[14], 0.0);
 }
 
+TEST(BaseConversion, PutsTheBaseIntoTheViewsFrame)
+{
+  const PlanarPose base_in_odom{ 2.0, 1.0, -0.4 };
+  const auto report_of = [&](const PlanarPose& goal_in_odom) {
+    HomingReport report;
+    report.stamp = 12.5;
+    report.goal_in_odom = goal_in_odom;
+    const PlanarPose goal = compose(inverse(base_in_odom), goal_in_odom);
+    report.heading = goal.heading();
+    report.distance = goal.distance();
+    report.yaw_error = goal.yaw;
+    return report;
+  };
+  const auto pose_of = [&](const PlanarPose& goal_in_odom) {
+    const geometry_msgs::Pose pose = toBasePose(report_of(goal_in_odom), "desk").pose.pose;
+    return Eigen::Vector3d(pose.position.x, pose.position.y, 2.0 * std::atan2(pose.orientation.z, pose.orientation.w));
+  };
+  const PlanarPose goal_in_odom{ 1.0, -2.0, 0.5 };
+  const PlanarPose expected = compose(inverse(goal_in_odom), base_in_odom);
+  const Eigen::Vector3d pose = pose_of(goal_in_odom);
+  EXPECT_LT((pose - Eigen::Vector3d(expected.x, expected.y, expected.yaw)).norm(), 1e-12);
+
+  constexpr double STEP = 1e-6;
+  Eigen::Matrix3d jacobian;
+  jacobian.col(0) = (pose_of({ 1.0 + STEP, -2.0, 0.5 }) - pose) / STEP;
+  jacobian.col(1) = (pose_of({ 1.0, -2.0 + STEP, 0.5 }) - pose) / STEP;
+  jacobian.col(2) = (pose_of({ 1.0, -2.0, 0.5 + STEP }) - pose) / STEP;
+  HomingReport report = report_of(goal_in_odom);
+  report.goal_covariance << 4.0, 1.0, 0.5, 1.0, 2.0, 0.3, 0.5, 0.3, 1.0;
+  const Eigen::Matrix3d covariance = jacobian * report.goal_covariance * jacobian.transpose();
+  const geometry_msgs::PoseWithCovarianceStamped message = toBasePose(report, "desk");
+  EXPECT_EQ(message.header.frame_id, "view_desk");
+  EXPECT_EQ(message.header.stamp, ros::Time(12.5));
+  EXPECT_NEAR(message.pose.covariance[0], covariance(0, 0), 1e-4);
+  EXPECT_NEAR(message.pose.covariance[1], covariance(0, 1), 1e-4);
+  EXPECT_NEAR(message.pose.covariance[5], covariance(0, 2), 1e-4);
+  EXPECT_NEAR(message.pose.covariance[11], covariance(1, 2), 1e-4);
+  EXPECT_NEAR(message.pose.covariance[35], covariance(2, 2), 1e-4);
+  EXPECT_EQ(message.pose.covariance[14], 0.0);
+}
+
 TEST(MatchConversion, HasNoNumbersWithoutGeometry)
 {
   ViewMatch match;

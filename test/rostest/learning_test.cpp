@@ -32,6 +32,7 @@ protected:
 
   Recorder<Heading> headings_{ "heading" };
   Recorder<geometry_msgs::PoseWithCovarianceStamped> view_pose_{ "view_pose" };
+  Recorder<geometry_msgs::PoseWithCovarianceStamped> base_pose_{ "base_pose" };
 };
 
 TEST_F(LearningTest, LearnsAViewWhileTheBaseIsDrivenAway)
@@ -48,6 +49,10 @@ TEST_F(LearningTest, LearnsAViewWhileTheBaseIsDrivenAway)
   EXPECT_TRUE(waitUntil([this] { return pointsLearnt() >= 30; })) << pointsLearnt();
   ASSERT_TRUE(view_pose_.last());
   EXPECT_LT(distance(view_pose_.last()->pose.pose.position, at_view), 0.05);
+  ASSERT_TRUE(base_pose_.last());
+  EXPECT_EQ(base_pose_.last()->header.frame_id, "view_learnt");
+  EXPECT_LT(distance(base_pose_.last()->pose.pose.position, geometry_msgs::Point()), 0.45);
+  EXPECT_LT(base_pose_.last()->pose.pose.position.x, -0.25) << "it was driven back";
   EXPECT_TRUE(waitUntil([this] { return wanted_.last()->view.empty(); })) << "the lesson is over";
 }
 

@@ -43,6 +43,12 @@ Heading toHeading(const HomingReport& report, const std::string& base_frame);
 /** The base's pose at the view, with its covariance, in `odom_frame`. The report must have a goal_in_odom. */
 geometry_msgs::PoseWithCovarianceStamped toViewPose(const HomingReport& report, const std::string& odom_frame);
 
+/**
+ * The base's pose, with its covariance, in the frame view_NAME, where the base is at the view NAME: x ahead, y to the
+ * left. Of the covariance of the report's goal_in_odom, which it must have; odometry adds nothing to it.
+ */
+geometry_msgs::PoseWithCovarianceStamped toBasePose(const HomingReport& report, const std::string& view);
+
 /** The direction to the view for rviz: a pose at the base with its x axis towards the view. */
 geometry_msgs::PoseStamped toHeadingArrow(const HomingReport& report, const std::string& base_frame);
 

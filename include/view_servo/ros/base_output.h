@@ -14,7 +14,7 @@ namespace view_servo
 {
 /**
  * Publishes what homing sends besides its status: commands as Twist and TwistStamped, the heading, with an arrow for
- * rviz, and `view_pose`, where the base has to be, in odometry's frame.
+ * rviz, `view_pose`, where the base has to be, in odometry's frame, and `base_pose`, where it is, in the view's frame.
  */
 class BaseOutput
 {
@@ -24,8 +24,8 @@ public:
 
   /** Publishes a command. */
   void publish(const BaseVelocity& velocity) const;
-  /** Publishes the heading, and the arrow and where the base has to be while they are known. */
-  void publish(const HomingReport& report, const std::string& odom_frame) const;
+  /** Publishes the heading, and the arrow and the poses while they are known. @param view name of the stored view. */
+  void publish(const HomingReport& report, const std::string& odom_frame, const std::string& view) const;
 
   /** Whether somebody subscribes to commands. */
   bool hasListener() const;
@@ -37,6 +37,7 @@ private:
   ros::Publisher headings_;
   ros::Publisher arrows_;
   ros::Publisher view_poses_;
+  ros::Publisher base_poses_;
 };
 
 }  // namespace view_servo
