@@ -16,6 +16,10 @@ function(configure_target target)
   endif()
   if(VIEW_SERVO_WERROR)
     target_compile_options(${target} PRIVATE -Werror)
+    # What GCC takes for uninitialized depends on how it optimises; from version 13 on, Eigen's matrices in std::optional.
+    if(CMAKE_CXX_COMPILER_ID STREQUAL GNU AND NOT CMAKE_CXX_COMPILER_VERSION VERSION_LESS 13)
+      target_compile_options(${target} PRIVATE -Wno-error=maybe-uninitialized)
+    endif()
   endif()
 endfunction()
 
