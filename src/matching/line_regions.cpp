@@ -4,6 +4,7 @@
 
 #include "agreeing_segments.h"
 #include "view_servo/features/side_correlation.h"
+#include "view_servo/geometry/homography.h"
 #include "view_servo/geometry/line_homography.h"
 
 #include <Eigen/Geometry>
