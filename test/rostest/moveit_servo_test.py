@@ -36,10 +36,12 @@ TIPS = {"camera": "camera_optical_frame", "manipulator": "flange"}  # of the gro
 
 
 def documented_settings():
-    """The block of docs/tutorials.md that says what to set."""
-    sources = [source for source in documents.Document("docs/tutorials.md").sources if source.language == "yaml"]
-    assert len(sources) == 1, sources
-    return yaml.safe_load(sources[0].text)
+    """The block of docs/tutorials.md that says what to set in moveit_servo."""
+    blocks = [yaml.safe_load(source.text) for source in documents.Document("docs/tutorials.md").sources
+              if source.language == "yaml"]
+    settings = [block for block in blocks if "move_group_name" in block]
+    assert len(settings) == 1, blocks
+    return settings[0]
 
 
 def turn_about(axis, angle):
