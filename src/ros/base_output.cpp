@@ -39,6 +39,9 @@ void BaseOutput::publish(const HomingReport& report, const std::string& odom_fra
   if (report.goal_in_odom)
   {
     view_poses_.publish(toViewPose(report, odom_frame));
+  }
+  if (report.goal_in_odom && report.tracked)  // while the view is not seen, odometry alone says where the base is
+  {
     base_poses_.publish(toBasePose(report, view));
   }
 }
