@@ -100,9 +100,10 @@ def work(options):
                         sample()
                 result = goal.get_result()
                 goals += 1
-                arrived += int(result.success)
-                if not result.success:
-                    print("soak: %s, goal %d: %s" % (robot.name, goals, result.message), flush=True)
+                arrived += int(bool(result and result.success))
+                if not result or not result.success:
+                    print("soak: %s, goal %d: %s" % (robot.name, goals, result.message if result else "forgotten by its driver"),
+                          flush=True)
                 for heard in (graph.commands, graph.statuses, graph.truths):
                     heard.clear()
             sample()

@@ -6,6 +6,7 @@ import graph
 import actionlib
 import numpy
 import rospy
+from actionlib import CommState
 from geometry_msgs.msg import PoseStamped
 from view_servo.msg import ServoToViewAction
 
@@ -35,3 +36,11 @@ class ArmTest(graph.GraphTest):
     def take_truth(cls, message):
         place = message.pose.position
         cls.place = numpy.array([place.x, place.y, place.z])
+
+    def wait_for_result(self, deadline=60.0 * graph.SLOWDOWN):
+        """
+        The result of the goal that was sent last, not before it is here: the status by which actionlib tells the goal's end
+        comes on another topic, and may be earlier. None where the node has forgotten the goal.
+        """
+        graph.wait_until("the goal's result", lambda: self.client.gh.get_comm_state() == CommState.DONE, deadline)
+        return self.client.get_result()

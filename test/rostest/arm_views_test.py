@@ -79,10 +79,9 @@ class ArmViews(arm_graph.ArmTest):
             self.feedback.clear()
 
     def tearDown(self):
-        if self.client.gh is not None and self.client.get_state() in (actionlib.GoalStatus.PENDING, actionlib.GoalStatus.ACTIVE):
+        if self.client.gh is not None:
             self.client.cancel_goal()
-            graph.wait_until("the end of what a test has left", lambda: self.client.get_state() not in (
-                actionlib.GoalStatus.PENDING, actionlib.GoalStatus.ACTIVE))
+            self.wait_for_result()
 
     def last(self):
         """The last feedback."""
@@ -106,8 +105,7 @@ class ArmViews(arm_graph.ArmTest):
 
     def end(self, state, words):
         """The goal must end so; the last command must be zero then, and the arm stand. Returns the result."""
-        graph.wait_until("the end", lambda: self.client.get_state() in (2, 3, 4, 5, 8, 9))
-        result = self.client.get_result()
+        result = self.wait_for_result()
         self.assertEqual(self.client.get_state(), state, result)
         self.assertIn(words, result.message)
         graph.wait_until("zeros", lambda: not self.moving())
