@@ -122,7 +122,7 @@ PointPair readOxfordPair(const fs::path& data, const std::string& sequence, int 
   {
     throw std::runtime_error("not a homography: " + truth_file.string());
   }
-  h = normalizedHomography(h);  // some are negative
+  h /= h(2, 2);  // some are negative
   pair.error = [h](const Correspondence& match) {
     return (transfer(h, match.reference) - match.current).norm();
   };

@@ -114,7 +114,7 @@ Eigen::Matrix3d normalizedHomography(const Eigen::Matrix3d& h)
 {
   constexpr double NEARLY_ZERO = 1e-12;
   const double norm = h.norm();
-  return std::abs(h(2, 2)) > NEARLY_ZERO * norm ? h / h(2, 2) : h / norm;
+  return std::abs(h(2, 2)) > NEARLY_ZERO * norm ? h / std::abs(h(2, 2)) : h / norm;
 }
 
 Eigen::Vector2d transfer(const Eigen::Matrix3d& h, const Eigen::Vector2d& point)

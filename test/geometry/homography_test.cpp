@@ -60,11 +60,13 @@ Correspondences goodSample()
            { { 100, 400 }, { 130, 420 } } };
 }
 
-TEST(NormalizedHomography, LastEntryIsOneUnlessItVanishes)
+TEST(NormalizedHomography, LastEntryIsOneUnlessItVanishesAndTheSignStays)
 {
   Eigen::Matrix3d h = Eigen::Matrix3d::Random();
-  h(2, 2) = -4.0;
+  h(2, 2) = 4.0;
   EXPECT_DOUBLE_EQ(normalizedHomography(h)(2, 2), 1.0);
+  h(2, 2) = -4.0;
+  EXPECT_DOUBLE_EQ(normalizedHomography(h)(2, 2), -1.0) << "points in view would be taken for behind the camera";
   EXPECT_LT(test::projectiveDistance(normalizedHomography(h), h), 1e-15);
   h(2, 2) = 0.0;
   EXPECT_NEAR(normalizedHomography(h).norm(), 1.0, 1e-15);

@@ -193,6 +193,33 @@ TEST_F(PlaneTrackerTest, JumpsWithOdometry)
     EXPECT_LT(test::largestCornerError(track.homography.h, scene.truth(time), { WIDTH, HEIGHT }), 0.3) << time;
     if (time > 2.05)
     {
+/** Seen from aside and from near, what the first pixel of the view shows is behind the camera. */
+TEST(PlaneTracker, FollowsAPlaneOfWhichAPartIsBehindTheCamera)
+{
+  const Scene scene;
+  const cv::Rect region(440, 280, 160, 160);
+  PlaneTracker tracker(scene.image(Eigen::Matrix3d::Identity()), region, K, PlaneTrackerParams());
+  const Eigen::Vector2d middle(520.0, 360.0);
+  const Eigen::Vector3d ray = K.inverse() * middle.homogeneous();
+  const Eigen::Vector3d seen = ray * (DISTANCE / scene.normal().dot(ray));
+  Eigen::Matrix3d camera;  // its axes in the view's frame
+  camera.col(2) = Eigen::Vector3d(1.0, 0.0, 1.0).normalized();
+  camera.col(0) = Eigen::Vector3d::UnitY().cross(camera.col(2)).normalized();
+  camera.col(1) = camera.col(2).cross(camera.col(0));
+  const Eigen::Vector3d place = seen - 0.45 * DISTANCE * camera.col(2);
+  const EuclideanHomography motion{ camera.transpose(), -camera.transpose() * place / DISTANCE, scene.normal() };
+  const Eigen::Matrix3d h = K * motion.matrix() * K.inverse();
+  ASSERT_LT(h(2, 2), 0.0);
+  ASSERT_TRUE(transfer(h, middle).allFinite());
+  tracker.start(h, std::nullopt);
+  for (int i = 0; i < 3; ++i)
+  {
+    const PlaneTrack& track = tracker.add(scene.image(h), std::nullopt);
+    ASSERT_EQ(track.state, TrackingState::TRACKING) << i;
+    EXPECT_LT((transfer(track.homography.h, middle) - transfer(h, middle)).norm(), 0.5) << i;
+  }
+}
+
       followed_alone += alone.add(scene.image(time), std::nullopt).state == TrackingState::TRACKING ? 1 : 0;
     }
     else

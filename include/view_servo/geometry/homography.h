@@ -19,6 +19,7 @@ namespace view_servo
 
 /**
  * H scaled so that H(2,2) = 1, or to Frobenius norm 1 where H(2,2) is nearly zero; other functions here return norm 1.
+ * The sign stays: H(2,2) = -1 where the reference's first pixel, as a point of the plane, is behind the current camera.
  */
 Eigen::Matrix3d normalizedHomography(const Eigen::Matrix3d& h);
 
