@@ -2,6 +2,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "hand_eye_problem.h"
 
+#include "view_servo/geometry/essential.h"
 #include "view_servo/geometry/rotation_vector.h"
 
 #include <Eigen/LU>
@@ -13,13 +14,6 @@ namespace view_servo::hand_eye
 namespace
 {
 constexpr double EXACT = 1e10;  // one over the square of 1e-5, for one pixel of error in images
-
-Eigen::Matrix3d crossMatrix(const Eigen::Vector3d& v)
-{
-  Eigen::Matrix3d matrix;
-  matrix << 0.0, -v.z(), v.y(), v.z(), 0.0, -v.x(), -v.y(), v.x(), 0.0;
-  return matrix;
-}
 
 /** Two unit vectors square to a unit vector and to each other, as columns. */
 Eigen::Matrix<double, 3, 2> squareTo(const Eigen::Vector3d& unit)

@@ -5,6 +5,7 @@
 #include "view_servo/Homography.h"
 #include "view_servo/SetView.h"
 #include "view_servo/control/travelled_way.h"
+#include "view_servo/geometry/camera_pose.h"
 #include "view_servo/parameters/seconds_since.h"
 #include "view_servo/ros/camera_input.h"
 #include "view_servo/ros/conversions.h"
@@ -26,6 +27,7 @@
 #include "view_servo/tracking/target_tracker.h"
 #include "view_servo/views/view_store.h"
 
+#include <geometry_msgs/PoseWithCovarianceStamped.h>
 #include <image_transport/image_transport.h>
 #include <ros/publisher.h>
 #include <ros/subscriber.h>
@@ -116,6 +118,8 @@ std::string nameOf(TrackingState state)
  *    when camera_info has distortion, of rectified ones, with P's K. While images, calibration or tf are lacking, twice
  *    a second, stamped now, with the reason. What cannot be followed (no such view, damaged, of another size than the
  *    images, the camera is not calibrated, or not any more as when it began) is refused, likewise;
+ *  - `~camera_pose` (geometry_msgs/PoseWithCovarianceStamped): of the camera in the frame `view_NAME`, where it was at
+ *    the view NAME, both as optical frames; while the view is tracked, its distance known and somebody subscribes;
  *  - `~overlay` (sensor_msgs/Image, bgr8): the view's outline and points, and the path of its middle; drawn when
  *    somebody listens;
  *  - `~markers` (visualization_msgs/MarkerArray, latched): plane, view, camera and ways, see markers.h; of each image
@@ -145,6 +149,7 @@ public:
       markers_(private_nh)
   {
     homography_publisher_ = private_nh_.advertise<Homography>("homography", 5);
+    pose_publisher_ = private_nh_.advertise<geometry_msgs::PoseWithCovarianceStamped>("camera_pose", 5);
     overlay_publisher_ = transport_.advertise("overlay", 1);
     if (!params_.view.empty())
     {
@@ -480,6 +485,7 @@ private:
   {
     const std::string reason = updateStatus(task, track, news);
     publishHomography(task, track, header, reason, false);
+    publishPose(task, header.stamp);
     if (overlay_publisher_.getNumSubscribers() > 0)
     {
       const TrackedHomography& found = track.homography;
@@ -583,6 +589,26 @@ private:
     }
   }
 
+  /** Publishes where the camera is by the last image, where that is known and somebody wants it. */
+  void publishPose(const Task& task, const ros::Time& stamp)
+  {
+    const std::optional<CameraPose> pose =
+        pose_publisher_.getNumSubscribers() > 0 ? session_->cameraPose() : std::nullopt;
+    if (!pose)
+    {
+      return;
+    }
+    geometry_msgs::PoseWithCovarianceStamped message;
+    message.header.stamp = stamp;
+    message.header.frame_id = "view_" + task.chosen.view;
+    message.pose = toPoseWithCovariance(*pose);
+    const std::lock_guard<std::mutex> lock(mutex_);
+    if (task.number == task_number_)
+    {
+      pose_publisher_.publish(message);
+    }
+  }
+
   void diagnose(diagnostic_updater::DiagnosticStatusWrapper& status)
   {
     const std::lock_guard<std::mutex> lock(mutex_);
@@ -635,6 +661,7 @@ private:
   image_transport::ImageTransport transport_;
   MarkerOutput markers_;
   ros::Publisher homography_publisher_;
+  ros::Publisher pose_publisher_;
   image_transport::Publisher overlay_publisher_;
   ros::Subscriber wanted_subscriber_;
   ros::ServiceServer start_service_;

@@ -255,7 +255,7 @@ geometry_msgs::PoseStamped toPoseStamped(const ViewPose& pose, const ros::Time& 
   return message;
 }
 
-geometry_msgs::PoseWithCovariance toPoseWithCovariance(const StructurePose& pose)
+geometry_msgs::PoseWithCovariance toPoseWithCovariance(const CameraPose& pose)
 {
   geometry_msgs::PoseWithCovariance message;
   const Eigen::Vector3d position = pose.view_from_current.translation();

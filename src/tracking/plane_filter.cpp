@@ -2,9 +2,12 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "view_servo/tracking/plane_filter.h"
 
+#include "odometry_scale.h"
+#include "view_servo/geometry/essential.h"
 #include "view_servo/geometry/rotation_vector.h"
 #include "view_servo/parameters/faults.h"
 
+#include <Eigen/Eigenvalues>
 #include <Eigen/LU>
 
 #include <algorithm>
@@ -14,6 +17,75 @@
 
 namespace view_servo
 {
+namespace
+{
+using Vector6d = Eigen::Matrix<double, 6, 1>;
+using Matrix6d = Eigen::Matrix<double, 6, 6>;
+
+constexpr double INDEPENDENT = 50.0;  // points near each other err alike: no more than so many count
+constexpr double AVERAGED = 15.0;     // likewise images from nearly the same place
+constexpr double LEAST_SD = 0.1;      // of a point [px]
+
+EuclideanHomography meanOf(const std::vector<EuclideanHomography>& motions)
+{
+  EuclideanHomography mean = motions.back();
+  Eigen::Matrix3d rotations = Eigen::Matrix3d::Zero();
+  mean.translation_over_distance.setZero();
+  for (const EuclideanHomography& motion : motions)
+  {
+    rotations += motion.rotation;
+    mean.translation_over_distance += motion.translation_over_distance / static_cast<double>(motions.size());
+  }
+  mean.rotation = nearestRotation(rotations);
+  return mean;
+}
+
+/** Covariance of a small rotation w, R' = exp(w) R, and of t / d, as noisy points of a plane of known normal tell it. */
+Matrix6d noiseOf(const EuclideanHomography& motion, const Eigen::Matrix3d& k, const Points& seen, double rms)
+{
+  Matrix6d information = Matrix6d::Zero();
+  const Eigen::Matrix3d inverse = k.inverse();
+  for (const Eigen::Vector2d& point : seen)
+  {
+    const Eigen::Vector3d ray = inverse * point.homogeneous();
+    const Eigen::Vector3d turned = motion.rotation * ray;
+    const double inverse_depth = motion.normal.dot(ray);  // times d
+    const Eigen::Vector3d at = turned + inverse_depth * motion.translation_over_distance;
+    Eigen::Matrix<double, 2, 3> by_point;
+    by_point << 1.0, 0.0, -at.x() / at.z(), 0.0, 1.0, -at.y() / at.z();
+    by_point = k.topLeftCorner<2, 2>() * by_point / at.z();
+    Eigen::Matrix<double, 2, 6> by_motion;
+    by_motion << -by_point * crossMatrix(turned), inverse_depth * by_point;
+    information += by_motion.transpose() * by_motion;
+  }
+  const double sd = std::max(rms / std::sqrt(2.0), LEAST_SD);  // of one coordinate
+  return sd * sd * information.inverse();
+}
+
+/** Covariance of motions about their mean, in the terms of noiseOf(). */
+Matrix6d scatterOf(const std::vector<EuclideanHomography>& motions)
+{
+  const EuclideanHomography mean = meanOf(motions);
+  Matrix6d scatter = Matrix6d::Zero();
+  for (const EuclideanHomography& motion : motions)
+  {
+    Vector6d off;
+    off << rotationVector(motion.rotation * mean.rotation.transpose()),
+        motion.translation_over_distance - mean.translation_over_distance;
+    scatter += off * off.transpose() / static_cast<double>(motions.size());
+  }
+  return scatter;
+}
+
+/** A symmetric matrix without its negative eigenvalues. */
+Matrix6d positivePart(const Matrix6d& matrix)
+{
+  const Eigen::SelfAdjointEigenSolver<Matrix6d> solver(matrix);
+  return solver.eigenvectors() * solver.eigenvalues().cwiseMax(0.0).asDiagonal() * solver.eigenvectors().transpose();
+}
+
+}  // namespace
+
 std::vector<Parameter> parameters(PlaneFilterParams& params)
 {
   return {
@@ -40,6 +112,12 @@ double PlaneFilter::Track::scatter() const
 {
   // |sum| = weight times the mean cosine, about 1 - angle²/2.
   return weight > 0.0 ? std::max(0.0, 2.0 * (1.0 - normals.norm() / weight)) : 0.0;
+}
+
+double PlaneFilter::Track::deviation() const
+{
+  constexpr double ENOUGH = 100.0;  // images that err independently
+  return std::sqrt(0.5 * scatter() / std::min(ENOUGH, static_cast<double>(std::max<std::size_t>(1, count))));
 }
 
 PlaneFilter::PlaneFilter(const PlaneFilterParams& params) : params_(params)
@@ -85,8 +163,9 @@ bool PlaneFilter::agrees(const Measurement& measurement, const EuclideanHomograp
   constexpr double LEAST_TRANSLATION = 0.06;  // of d
   constexpr double SCATTERS = 5.0;
   const Eigen::Isometry3d moved = measurement.camera_in_odom->inverse() * camera_in_odom;
-  const std::optional<double> known = distance();
-  const EuclideanHomography expected = movedOn(motion, moved, known.value_or(std::numeric_limits<double>::infinity()));
+  const std::optional<OdometryScale> known = distance(normal());
+  const EuclideanHomography expected =
+      movedOn(motion, moved, known ? known->metres : std::numeric_limits<double>::infinity());
   const EuclideanHomography seen = motionBefore(measurement.calibrated, normal());
   const double turn = rotationVector(expected.rotation.transpose() * seen.rotation).norm();
   const double way = (expected.translation_over_distance - seen.translation_over_distance).norm();
@@ -205,33 +284,15 @@ Eigen::Vector3d PlaneFilter::normal() const
   return tracks_.empty() ? Eigen::Vector3d(Eigen::Vector3d::UnitZ()) : tracks_.front().normal();
 }
 
-std::optional<double> PlaneFilter::distance() const
+std::optional<OdometryScale> PlaneFilter::distance(const Eigen::Vector3d& normal) const
 {
-  double squared_way = 0.0;
-  double change_by_way = 0.0;
-  double farthest = 0.0;
-  std::vector<EuclideanHomography> motions;
+  std::vector<MeasuredWay> ways;
+  ways.reserve(places_.size());
   for (const Measurement& place : places_)
   {
-    motions.push_back(motionBefore(place.calibrated, normal()));
+    ways.push_back({ motionBefore(place.calibrated, normal).translation_over_distance, *place.camera_in_odom });
   }
-  for (std::size_t i = 0; i < places_.size(); ++i)
-  {
-    for (std::size_t j = 0; j < i; ++j)
-    {
-      const Eigen::Isometry3d moved = places_[i].camera_in_odom->inverse() * *places_[j].camera_in_odom;
-      const Eigen::Vector3d change =
-          motions[i].translation_over_distance - moved.linear() * motions[j].translation_over_distance;
-      squared_way += moved.translation().squaredNorm();
-      change_by_way += change.dot(moved.translation());
-      farthest = std::max(farthest, moved.translation().norm());
-    }
-  }
-  if (tracks_.empty() || !(farthest >= params_.window) || !(change_by_way > 0.0))
-  {
-    return std::nullopt;
-  }
-  return squared_way / change_by_way;
+  return tracks_.empty() ? std::nullopt : scaleByOdometry(ways, params_.window);
 }
 
 PlaneEstimate PlaneFilter::estimateOf(const Measurement& last) const
@@ -239,46 +300,101 @@ PlaneEstimate PlaneFilter::estimateOf(const Measurement& last) const
   PlaneEstimate result;
   result.normal_known = !tracks_.empty();
   result.ambiguous = tracks_.size() > 1;
-  result.distance = distance();
+  if (const std::optional<OdometryScale> scale = distance(normal()))
+  {
+    result.distance = scale->metres;
+  }
   result.motion = motionBefore(last.calibrated, normal());
   return result;
 }
 
-void PlaneFilter::average()
+std::vector<EuclideanHomography> PlaneFilter::motionsNow(const Eigen::Vector3d& normal, double distance) const
 {
   const Measurement& last = measurements_.back();
-  PlaneEstimate result = estimateOf(last);
-  rotation_scatter_ = translation_scatter_ = 0.0;
-  if (last.camera_in_odom)
+  std::vector<EuclideanHomography> motions;
+  motions.reserve(measurements_.size());
+  for (const Measurement& measurement : measurements_)
   {
-    const auto count = static_cast<double>(measurements_.size());
-    Eigen::Matrix3d rotations = Eigen::Matrix3d::Zero();
-    Eigen::Vector3d translations = Eigen::Vector3d::Zero();
-    std::vector<EuclideanHomography> motions;
-    for (const Measurement& measurement : measurements_)
-    {
-      const Eigen::Isometry3d moved = last.camera_in_odom->inverse() * *measurement.camera_in_odom;
-      motions.push_back(movedOn(motionBefore(measurement.calibrated, normal()), moved,
-                                result.distance.value_or(std::numeric_limits<double>::infinity())));
-      rotations += motions.back().rotation;
-      translations += motions.back().translation_over_distance / count;
-    }
-    result.motion.rotation = nearestRotation(rotations);
+    const Eigen::Isometry3d moved = last.camera_in_odom->inverse() * *measurement.camera_in_odom;
+    motions.push_back(movedOn(motionBefore(measurement.calibrated, normal), moved, distance));
+  }
+  return motions;
+}
+
+void PlaneFilter::average()
+{
+  PlaneEstimate result = estimateOf(measurements_.back());
+  rotation_scatter_ = translation_scatter_ = 0.0;
+  if (measurements_.back().camera_in_odom)
+  {
+    const std::vector<EuclideanHomography> motions =
+        motionsNow(normal(), result.distance.value_or(std::numeric_limits<double>::infinity()));
+    const EuclideanHomography mean = meanOf(motions);
+    const auto count = static_cast<double>(motions.size());
+    result.motion.rotation = mean.rotation;
     for (const EuclideanHomography& motion : motions)
     {
-      rotation_scatter_ += rotationVector(result.motion.rotation.transpose() * motion.rotation).squaredNorm() / count;
-      translation_scatter_ += (motion.translation_over_distance - translations).squaredNorm() / count;
+      rotation_scatter_ += rotationVector(mean.rotation.transpose() * motion.rotation).squaredNorm() / count;
+      translation_scatter_ += (motion.translation_over_distance - mean.translation_over_distance).squaredNorm() / count;
     }
     rotation_scatter_ = std::sqrt(rotation_scatter_);
     translation_scatter_ = std::sqrt(translation_scatter_);
     // Without a distance, odometry does not tell how far the others have to be moved.
     if (result.distance)
     {
-      result.motion.translation_over_distance = translations;
+      result.motion.translation_over_distance = mean.translation_over_distance;
     }
   }
   averaged_ = result.motion;
   estimate_ = result;
+}
+
+std::optional<CameraPose> PlaneFilter::cameraPose(const Eigen::Matrix3d& k, const Points& seen, double rms) const
+{
+  if (!estimate_ || !estimate_->distance || estimate_->ambiguous || odd_ || !measurements_.back().camera_in_odom)
+  {
+    return std::nullopt;
+  }
+  const Eigen::Vector3d towards = normal();
+  const auto motion_with = [&](const Eigen::Vector3d& normal, double distance) {
+    const EuclideanHomography mean = meanOf(motionsNow(normal, distance));
+    Eigen::Isometry3d motion = Eigen::Isometry3d::Identity();
+    motion.linear() = mean.rotation;
+    motion.translation() = distance * mean.translation_over_distance;
+    return motion;
+  };
+  const double away = *estimate_->distance;
+  const Eigen::Isometry3d motion = motion_with(towards, away);
+  const auto difference = [&](const Eigen::Isometry3d& other) {
+    Vector6d change;
+    change << rotationVector(other.linear() * motion.linear().transpose()), other.translation() - motion.translation();
+    return change;
+  };
+
+  // What the motions scatter beyond the images' noise comes from odometry, and its last error is in all of them.
+  const std::vector<EuclideanHomography> motions = motionsNow(towards, away);
+  const Matrix6d noise = noiseOf({ motion.linear(), motion.translation() / away, towards }, k, seen, rms);
+  Matrix6d covariance = std::max(1.0, static_cast<double>(seen.size()) / INDEPENDENT) * noise /
+                            std::min(AVERAGED, static_cast<double>(motions.size())) +
+                        positivePart(scatterOf(motions) - noise);
+  covariance.bottomRows<3>() *= away;
+  covariance.rightCols<3>() *= away;
+
+  // A normal that is not exact makes the distance wrong, too, and both the motions.
+  constexpr double SMALL = 1e-4;  // [rad]
+  const double normal_deviation = tracks_.front().deviation();
+  const Eigen::Vector3d across = towards.unitOrthogonal();
+  for (const Eigen::Vector3d& aside : { across, Eigen::Vector3d(towards.cross(across)) })
+  {
+    const Eigen::Vector3d turned = (towards + SMALL * aside).normalized();
+    const std::optional<OdometryScale> scale = distance(turned);
+    const Vector6d change = difference(motion_with(turned, scale ? scale->metres : away)) / SMALL;
+    covariance += normal_deviation * normal_deviation * change * change.transpose();
+  }
+  const double relative = distance(towards)->relative_deviation;
+  const Vector6d change = difference(motion_with(towards, away * (1.0 + SMALL))) / SMALL;
+  covariance += relative * relative * change * change.transpose();
+  return cameraPoseAfter(motion, covariance);
 }
 
 }  // namespace view_servo

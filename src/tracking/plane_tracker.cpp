@@ -84,4 +84,13 @@ const PlaneTrack& PlaneTracker::add(const cv::Mat& image, const std::optional<Ei
   return track_;
 }
 
+std::optional<CameraPose> PlaneTracker::cameraPose() const
+{
+  if (track_.state != TrackingState::TRACKING)
+  {
+    return std::nullopt;
+  }
+  return filter_.cameraPose(k_, track_.homography.points, track_.homography.rms);
+}
+
 }  // namespace view_servo

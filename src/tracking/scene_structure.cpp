@@ -255,6 +255,35 @@ Eigen::Isometry3d fitMotion(const std::vector<ScenePoint>& points, const std::ve
   return motion;
 }
 
+Matrix6 motionCovariance(const std::vector<ScenePoint>& points, const std::vector<SceneSighting>& sightings,
+                         const Eigen::Isometry3d& motion)
+{
+  constexpr double INDEPENDENT = 150.0;
+  Matrix6 information = Matrix6::Zero();
+  double squares = 0.0;
+  double count = 0.0;
+  for (const SceneSighting& sighting : sightings)
+  {
+    const ScenePoint& point = points[sighting.index];
+    const Linearized at = linearize(point, motion);
+    if (at.in_front)
+    {
+      const Eigen::Matrix2d covariance =
+          sighting.covariance + depthVariance(point) * at.by_depth * at.by_depth.transpose();
+      const Eigen::Matrix2d own = covariance.inverse();
+      const Eigen::Vector2d residual = at.seen - sighting.seen;
+      squares += residual.dot(own * residual);
+      information += at.by_motion.transpose() * own * at.by_motion;
+      count += 1.0;
+    }
+  }
+  // linearize() moves t with the rotation.
+  Matrix6 by_step = Matrix6::Identity();
+  by_step.bottomLeftCorner<3, 3>() = -crossMatrix(motion.translation());
+  const double variance = squares / std::max(1.0, 2.0 * count) * std::max(1.0, count / INDEPENDENT);
+  return variance * by_step * information.inverse() * by_step.transpose();
+}
+
 bool supports(const ScenePoint& point, const SceneSighting& sighting, const Eigen::Isometry3d& motion, double radius,
               double& residual)
 {

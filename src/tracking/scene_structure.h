@@ -72,6 +72,15 @@ Eigen::Isometry3d fitMotion(const std::vector<ScenePoint>& points, const std::ve
                             const Eigen::Isometry3d& initial);
 
 /**
+ * How exact a fitted motion is: covariance of a small rotation vector w, R' = exp(w) R, and of t, X_cur = R X_view + t, as
+ * the sightings' residuals and what is known of the depths let one expect it. No more than 150 sightings count as
+ * independent.
+ */
+Eigen::Matrix<double, 6, 6> motionCovariance(const std::vector<ScenePoint>& points,
+                                             const std::vector<SceneSighting>& sightings,
+                                             const Eigen::Isometry3d& motion);
+
+/**
  * Whether a sighting is where a motion puts its point, to within `radius`, or lies so along the epipolar line as the
  * depth is uncertain. @param residual is set to the distance that remains then.
  */

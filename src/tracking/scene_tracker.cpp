@@ -3,6 +3,7 @@
 #include "view_servo/tracking/scene_tracker.h"
 
 #include "corner_patches.h"
+#include "odometry_scale.h"
 #include "patch.h"
 #include "scene_structure.h"
 #include "view_servo/geometry/homography.h"
@@ -71,11 +72,13 @@ public:
 
   void start(const SceneFinder::Answer& answer, const std::optional<Eigen::Isometry3d>& camera_in_odom);
   PlaneTrack add(const cv::Mat& image, const std::optional<Eigen::Isometry3d>& camera_in_odom);
+  std::optional<CameraPose> cameraPose() const;
 
 private:
   struct Last
   {
     Eigen::Isometry3d motion;
+    std::vector<SceneSighting> supporting;
     std::optional<Eigen::Isometry3d> camera_in_odom;
   };
 
@@ -89,7 +92,7 @@ private:
   std::vector<SceneSighting> alignAll(const cv::Mat& current, std::size_t level, const Eigen::Isometry3d& motion,
                                       const std::vector<double>& inverse_depths, int iterations, int& looked_for) const;
   bool remember(const Sight& sight, const std::optional<Eigen::Isometry3d>& camera_in_odom);
-  std::optional<double> metresPerUnit() const;
+  std::optional<OdometryScale> metresPerUnit() const;
   double unitDepth() const;
   PlaneTrack trackOf(const Sight& sight) const;
 
@@ -101,7 +104,7 @@ private:
   std::vector<ScenePoint> structure_;        // of the corners; empty before a start
   bool confirmed_ = false;                   // the structure was found in some image
   std::vector<Place> places_;                // apart from each other, newest last
-  std::optional<double> metres_;             // that a unit of the structure is long
+  std::optional<OdometryScale> scale_;       // of the structure's unit
   std::optional<Last> last_;                 // where the scene was found last
   bool found_once_ = false;                  // in some image
   int missed_ = 0;                           // images in a row without the scene
@@ -126,10 +129,10 @@ void SceneTracker::Impl::start(const SceneFinder::Answer& answer,
     motion = beginStructure(answer.motion, answer.matches, pixel(), structure_);
     findSlopes(structure_, pixel());
     places_.clear();
-    metres_.reset();
+    scale_.reset();
     confirmed_ = false;
   }
-  last_ = Last{ motion, camera_in_odom };
+  last_ = Last{ motion, {}, camera_in_odom };
 }
 
 Eigen::Isometry3d SceneTracker::Impl::predict(const std::optional<Eigen::Isometry3d>& camera_in_odom) const
@@ -139,7 +142,7 @@ Eigen::Isometry3d SceneTracker::Impl::predict(const std::optional<Eigen::Isometr
     return last_->motion;
   }
   Eigen::Isometry3d moved = camera_in_odom->inverse() * *last_->camera_in_odom;
-  moved.translation() *= metres_ ? 1.0 / *metres_ : 0.0;
+  moved.translation() *= scale_ ? 1.0 / scale_->metres : 0.0;
   return moved * last_->motion;
 }
 
@@ -311,41 +314,26 @@ bool SceneTracker::Impl::remember(const Sight& sight, const std::optional<Eigen:
     places_[i].frame.motion = frames[i].motion;
   }
   findSlopes(structure_, pixel());
-  metres_ = metresPerUnit();
+  scale_ = metresPerUnit();
   return true;
 }
 
 /**
- * By least squares for its inverse, from all pairs of places; empty while they are too close to each other. They may be
- * closer than those of a plane, as depths do not leave way and turn to be mistaken for each other.
+ * Empty while the places are too close to each other. They may be closer than those of a plane, as depths do not leave
+ * way and turn to be mistaken for each other.
  */
-std::optional<double> SceneTracker::Impl::metresPerUnit() const
+std::optional<OdometryScale> SceneTracker::Impl::metresPerUnit() const
 {
   constexpr double OF_WINDOW = 0.3;
-  double squared_way = 0.0;
-  double change_by_way = 0.0;
-  double farthest = 0.0;
-  for (std::size_t i = 0; i < places_.size(); ++i)
+  std::vector<MeasuredWay> ways;
+  for (const Place& place : places_)
   {
-    for (std::size_t j = 0; j < i; ++j)
+    if (place.camera_in_odom)
     {
-      if (!places_[i].camera_in_odom || !places_[j].camera_in_odom)
-      {
-        continue;
-      }
-      const Eigen::Isometry3d moved = places_[i].camera_in_odom->inverse() * *places_[j].camera_in_odom;
-      const Eigen::Vector3d change =
-          places_[i].frame.motion.translation() - moved.linear() * places_[j].frame.motion.translation();
-      squared_way += moved.translation().squaredNorm();
-      change_by_way += change.dot(moved.translation());
-      farthest = std::max(farthest, moved.translation().norm());
+      ways.push_back({ place.frame.motion.translation(), *place.camera_in_odom });
     }
   }
-  if (!(farthest >= OF_WINDOW * params_.filter.window) || !(change_by_way > 0.0))
-  {
-    return std::nullopt;
-  }
-  return squared_way / change_by_way;
+  return scaleByOdometry(ways, OF_WINDOW * params_.filter.window);
 }
 
 /** Depth of the virtual plane: the median of what is around the chosen point, in the structure's unit. */
@@ -377,9 +365,9 @@ PlaneTrack SceneTracker::Impl::trackOf(const Sight& sight) const
   plane.motion.translation_over_distance = last_->motion.translation() / unitDepth();
   plane.motion.normal = Eigen::Vector3d::UnitZ();
   plane.normal_known = true;
-  if (metres_)
+  if (scale_)
   {
-    plane.distance = *metres_ * unitDepth();
+    plane.distance = scale_->metres * unitDepth();
   }
   track.plane = plane;
   TrackedHomography& homography = track.homography;
@@ -422,12 +410,30 @@ PlaneTrack SceneTracker::Impl::add(const cv::Mat& image, const std::optional<Eig
   missed_ = 0;
   found_once_ = true;
   confirmed_ = true;
-  last_ = Last{ sight.motion, camera_in_odom };
+  last_ = Last{ sight.motion, sight.supporting, camera_in_odom };
   if (remember(sight, camera_in_odom))
   {
     last_->motion = fitMotion(structure_, sight.supporting, sight.motion);
   }
   return trackOf(sight);
+}
+
+std::optional<CameraPose> SceneTracker::Impl::cameraPose() const
+{
+  using Vector6d = Eigen::Matrix<double, 6, 1>;
+  if (!last_ || missed_ > 0 || last_->supporting.empty() || !scale_)
+  {
+    return std::nullopt;
+  }
+  Eigen::Isometry3d motion = last_->motion;
+  Eigen::Matrix<double, 6, 6> covariance = motionCovariance(structure_, last_->supporting, motion);
+  motion.translation() *= scale_->metres;
+  covariance.bottomRows<3>() *= scale_->metres;
+  covariance.rightCols<3>() *= scale_->metres;
+  Vector6d by_scale = Vector6d::Zero();
+  by_scale.tail<3>() = scale_->relative_deviation * motion.translation();
+  covariance += by_scale * by_scale.transpose();
+  return cameraPoseAfter(motion, covariance);
 }
 
 SceneTracker::SceneTracker(const cv::Mat& reference, const cv::Rect& region, const Eigen::Matrix3d& k,
@@ -448,6 +454,11 @@ const PlaneTrack& SceneTracker::add(const cv::Mat& image, const std::optional<Ei
 {
   track_ = impl_->add(image, camera_in_odom);
   return track_;
+}
+
+std::optional<CameraPose> SceneTracker::cameraPose() const
+{
+  return impl_->cameraPose();
 }
 
 const std::vector<Eigen::Vector2d>& SceneTracker::points() const

@@ -75,4 +75,13 @@ const PlaneTrack& TargetTracker::add(const cv::Mat& image, const std::optional<E
   return track_;
 }
 
+std::optional<CameraPose> TargetTracker::cameraPose() const
+{
+  if (track_.state != TrackingState::TRACKING)
+  {
+    return std::nullopt;
+  }
+  return follows_scene_ ? scene_->cameraPose() : plane_.cameraPose();
+}
+
 }  // namespace view_servo

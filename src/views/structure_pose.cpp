@@ -105,17 +105,10 @@ StructurePose withCovariance(const Eigen::Matrix3d& rotation, const Eigen::Vecto
   const double variance = std::max(squares / (2.0 * count), NOISE * NOISE * pixel * pixel);
   const Matrix6d of_motion = information.inverse() * (variance * std::max(1.0, count / INDEPENDENT));
 
-  // The pose in the view: p = -R^T t, and rotations about the view's axes.
-  Matrix6d by_motion = Matrix6d::Zero();
-  by_motion.topLeftCorner<3, 3>() = -rotation.transpose() * crossMatrix(translation);
-  by_motion.topRightCorner<3, 3>() = -rotation.transpose();
-  by_motion.bottomLeftCorner<3, 3>() = -rotation.transpose();
-  StructurePose pose;
-  pose.view_from_current.linear() = rotation.transpose();
-  pose.view_from_current.translation() = -rotation.transpose() * translation;
-  pose.covariance = by_motion * of_motion * by_motion.transpose();
-  pose.inliers = inliers.size();
-  return pose;
+  Eigen::Isometry3d motion = Eigen::Isometry3d::Identity();
+  motion.linear() = rotation;
+  motion.translation() = translation;
+  return { cameraPoseAfter(motion, of_motion), inliers.size() };
 }
 
 }  // namespace

@@ -20,7 +20,7 @@ from arm_poses import looking_at_the_box  # noqa: E402
 import actionlib  # noqa: E402
 import numpy  # noqa: E402
 import rospy  # noqa: E402
-from geometry_msgs.msg import TwistStamped  # noqa: E402
+from geometry_msgs.msg import PoseWithCovarianceStamped, TwistStamped  # noqa: E402
 from std_msgs.msg import Bool  # noqa: E402
 from view_servo.msg import ServoToViewGoal, ServoView  # noqa: E402
 
@@ -38,9 +38,10 @@ class ArmViews(arm_graph.ArmTest):
     def setUpClass(cls):
         super().setUpClass()
         cls.lock = threading.Lock()
-        cls.commands, cls.feedback = [], []
+        cls.commands, cls.feedback, cls.poses = [], [], []
         cls.stop = rospy.Publisher("/stop", Bool, queue_size=1, latch=True)
-        cls.start_arm([rospy.Subscriber("/cmd_vel", TwistStamped, cls.take_command)])
+        cls.start_arm([rospy.Subscriber("/cmd_vel", TwistStamped, cls.take_command),
+                       rospy.Subscriber("/homography_tracker/camera_pose", PoseWithCovarianceStamped, cls.take_pose)])
         status, text = cls.graph.run("rosservice call /servo_25d/enable true")
         assert status == 0, text
 
@@ -55,6 +56,11 @@ class ArmViews(arm_graph.ArmTest):
     def take_feedback(cls, message):
         with cls.lock:
             cls.feedback.append(message)
+
+    @classmethod
+    def take_pose(cls, message):
+        with cls.lock:
+            cls.poses.append(message)
 
     def distance(self, pose):
         return numpy.linalg.norm(self.place - pose[:3])
@@ -77,9 +83,11 @@ class ArmViews(arm_graph.ArmTest):
         with self.lock:
             self.commands.clear()
             self.feedback.clear()
+            self.poses.clear()
 
     def tearDown(self):
-        if self.client.gh is not None:
+        # One that has ended is not cancelled: actionlib would wait for its cancellation for ever.
+        if self.client.gh is not None and self.client.gh.get_comm_state() != actionlib.CommState.DONE:
             self.client.cancel_goal()
             self.wait_for_result()
 
@@ -129,6 +137,20 @@ class ArmViews(arm_graph.ArmTest):
             told = [(message.number, message.view, message.count) for message in self.feedback]
         self.assertEqual(sorted(set(told)), [(1, "approach", 2), (2, "grasp", 2)])
         self.assertEqual(told, sorted(told))
+        self.check_poses()
+
+    def check_poses(self):
+        """Of the camera in the frame of the second view, by the tracker: when it turns to that view, and at the end."""
+        with self.lock:
+            poses = [message for message in self.poses if message.header.frame_id == "view_grasp"]
+        self.assertGreater(len(poses), 10)
+        for message, way in ((poses[0], numpy.linalg.norm(numpy.subtract(APPROACH[:3], GRASP[:3]))), (poses[-1], 0.0)):
+            place = message.pose.pose.position
+            variances = numpy.diag(numpy.reshape(message.pose.covariance, (6, 6)))
+            self.assertTrue((variances > 0.0).all(), message)
+            self.assertLess(abs(numpy.linalg.norm((place.x, place.y, place.z)) - way),
+                            REST + 0.2 * way + 3.0 * numpy.sqrt(variances[:3].sum()), message)
+        self.assertLess(variances[:3].max(), 4.0 * REST**2)
 
     def test_the_command_does_so_too(self):
         status, text = self.graph.run("rosrun view_servo view go approach grasp --approach 0.005 0.02")

@@ -2,6 +2,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "view_servo/tracking/plane_filter.h"
 
+#include "support/camera_pose_error.h"
 #include "support/cameras.h"
 #include "support/synthetic_scene.h"
 #include "view_servo/geometry/homography.h"
@@ -174,6 +175,37 @@ TEST(PlaneFilter, FindsPlaneDistanceAndMotionOnTheWay)
       }
     }
     EXPECT_LT(filtered, raw) << seed;
+  }
+}
+
+TEST(PlaneFilter, KnowsHowExactTheCamerasPoseIs)
+{
+  constexpr int RUNS = 40;
+  constexpr double NOISE = 0.3;  // of each coordinate [px]
+  for (const double until : { 0.5, 0.75, 1.0 })
+  {
+    double normalised = 0.0;
+    int known = 0;
+    for (std::uint64_t seed = 1; seed <= RUNS; ++seed)
+    {
+      Approach approach(seed);
+      PlaneFilter filter{ PlaneFilterParams() };
+      EXPECT_FALSE(filter.cameraPose(FILTERED_K, approach.points(), NOISE));
+      for (int i = 0; i <= 80; ++i)
+      {
+        approach.addTo(filter, until * i / 80.0, NOISE);
+      }
+      const auto pose = filter.cameraPose(FILTERED_K, approach.points(), std::sqrt(2.0) * NOISE);
+      if (!pose)
+      {
+        continue;
+      }
+      ++known;
+      normalised += test::normalisedError(*pose, approach.camera(until));
+    }
+    EXPECT_GE(known, RUNS * 3 / 4) << until;
+    EXPECT_LT(normalised / known, 4.0) << until;
+    EXPECT_GT(normalised / known, 0.25) << until;
   }
 }
 

@@ -2,6 +2,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "view_servo/tracking/plane_tracker.h"
 
+#include "support/camera_pose_error.h"
 #include "support/cameras.h"
 #include "support/corner_error.h"
 
@@ -160,6 +161,26 @@ TEST_F(PlaneTrackerTest, FollowsThePlaneAndLearnsWhereItIs)
   }
 }
 
+TEST_F(PlaneTrackerTest, KnowsHowExactTheCamerasPoseIs)
+{
+  tracker.start(scene.truth(0.0), scene.odometry(0.0));
+  double normalised = 0.0;
+  int count = 0;
+  for (int i = 0; i <= 90; ++i)
+  {
+    const double time = i / RATE;
+    tracker.add(scene.image(time), scene.odometry(time));
+    if (const auto pose = tracker.cameraPose())
+    {
+      normalised += test::normalisedError(*pose, Scene::camera(time));
+      ++count;
+    }
+  }
+  EXPECT_GT(count, 20);
+  EXPECT_LT(normalised / count, 4.0);
+  EXPECT_GT(normalised / count, 0.25);
+}
+
 TEST_F(PlaneTrackerTest, DoesWithoutOdometry)
 {
   tracker.start(scene.truth(0.0), std::nullopt);
@@ -172,27 +193,6 @@ TEST_F(PlaneTrackerTest, DoesWithoutOdometry)
   }
 }
 
-/** Odometry tells of jumps that the images alone could not follow. */
-TEST_F(PlaneTrackerTest, JumpsWithOdometry)
-{
-  PlaneTracker alone(scene.image(Eigen::Matrix3d::Identity()), cv::Rect(), K, PlaneTrackerParams());
-  int followed_alone = 0;
-  tracker.start(scene.truth(0.0), scene.odometry(0.0));
-  alone.start(scene.truth(0.0), std::nullopt);
-  // Far enough for the distance to be known, then now and then.
-  std::vector<double> times;
-  for (int i = 0; i <= 20; ++i)
-  {
-    times.push_back(0.1 * i);
-  }
-  times.insert(times.end(), { 2.8, 3.6, 4.4, 5.2 });
-  for (const double time : times)
-  {
-    const PlaneTrack& track = tracker.add(scene.image(time), scene.odometry(time));
-    ASSERT_EQ(track.state, TrackingState::TRACKING) << time;
-    EXPECT_LT(test::largestCornerError(track.homography.h, scene.truth(time), { WIDTH, HEIGHT }), 0.3) << time;
-    if (time > 2.05)
-    {
 /** Seen from aside and from near, what the first pixel of the view shows is behind the camera. */
 TEST(PlaneTracker, FollowsAPlaneOfWhichAPartIsBehindTheCamera)
 {
@@ -220,6 +220,27 @@ TEST(PlaneTracker, FollowsAPlaneOfWhichAPartIsBehindTheCamera)
   }
 }
 
+/** Odometry tells of jumps that the images alone could not follow. */
+TEST_F(PlaneTrackerTest, JumpsWithOdometry)
+{
+  PlaneTracker alone(scene.image(Eigen::Matrix3d::Identity()), cv::Rect(), K, PlaneTrackerParams());
+  int followed_alone = 0;
+  tracker.start(scene.truth(0.0), scene.odometry(0.0));
+  alone.start(scene.truth(0.0), std::nullopt);
+  // Far enough for the distance to be known, then now and then.
+  std::vector<double> times;
+  for (int i = 0; i <= 20; ++i)
+  {
+    times.push_back(0.1 * i);
+  }
+  times.insert(times.end(), { 2.8, 3.6, 4.4, 5.2 });
+  for (const double time : times)
+  {
+    const PlaneTrack& track = tracker.add(scene.image(time), scene.odometry(time));
+    ASSERT_EQ(track.state, TrackingState::TRACKING) << time;
+    EXPECT_LT(test::largestCornerError(track.homography.h, scene.truth(time), { WIDTH, HEIGHT }), 0.3) << time;
+    if (time > 2.05)
+    {
       followed_alone += alone.add(scene.image(time), std::nullopt).state == TrackingState::TRACKING ? 1 : 0;
     }
     else

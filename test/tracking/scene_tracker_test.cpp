@@ -5,6 +5,7 @@
 #include "sim/visibility.h"
 #include "sim/world_reader.h"
 
+#include "support/camera_pose_error.h"
 #include "support/shipped_files.h"
 #include "view_servo/geometry/region.h"
 #include "view_servo/parameters/numbers.h"
@@ -35,8 +36,8 @@ using sim::World;
 class ViewedWorld
 {
 public:
-  explicit ViewedWorld(const std::string& name)
-    : world(sim::readWorld(test::worldFile(name))), camera_(world, {}, 1), reference(camera_.capture(world.goal))
+  explicit ViewedWorld(const std::string& name, std::uint64_t seed = 1)
+    : world(sim::readWorld(test::worldFile(name))), camera_(world, {}, seed), reference(camera_.capture(world.goal))
   {
   }
 
@@ -153,6 +154,33 @@ TEST_P(SceneTrackerTest, KnowsThePoseAllTheWay)
   EXPECT_LT(there.translation_over_distance.norm(), 2e-4);
   EXPECT_LT(turnFrom(there.rotation, Eigen::Matrix3d::Identity()), 0.01 * DEGREE);
   EXPECT_TRUE((tracker.track().homography.h - Eigen::Matrix3d::Identity()).norm() < 0.2);
+}
+
+TEST_P(SceneTrackerTest, KnowsHowExactThePoseIs)
+{
+  constexpr int RUNS = 4;
+  double normalised = 0.0;
+  int count = 0;
+  for (std::uint64_t seed = 1; seed <= RUNS; ++seed)
+  {
+    ViewedWorld scene(GetParam(), seed);
+    SceneTracker tracker = scene.tracker();
+    tracker.start(scene.find(scene.image(scene.onTheWay("far", 0.0))), scene.onTheWay("far", 0.0));
+    EXPECT_FALSE(tracker.cameraPose());
+    for (int i = 0; i <= STEPS_TO_GOAL; ++i)
+    {
+      const Eigen::Isometry3d camera = scene.onTheWay("far", static_cast<double>(i) / STEPS_TO_GOAL);
+      tracker.add(scene.image(camera), camera);
+      if (const auto pose = tracker.cameraPose())
+      {
+        normalised += test::normalisedError(*pose, scene.motion(camera).inverse());
+        ++count;
+      }
+    }
+  }
+  EXPECT_GT(count, RUNS * STEPS_TO_GOAL / 2);
+  EXPECT_LT(normalised / count, 4.0);
+  EXPECT_GT(normalised / count, 0.25);
 }
 
 TEST_P(SceneTrackerTest, LearnsTheDepths)

@@ -2,12 +2,12 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "view_servo/views/structure_pose.h"
 
+#include "support/camera_pose_error.h"
 #include "support/matched_views.h"
 #include "support/room_structure.h"
 #include "view_servo/robust/random.h"
 
 #include <gtest/gtest.h>
-#include <Eigen/Cholesky>
 #include <Eigen/Geometry>
 
 #include <cstdint>
@@ -105,10 +105,7 @@ TEST(StructurePose, HasACovarianceThatIsNotTooSmall)
     const Walk walk(0.2, 1.0, 0, seed);
     const auto pose = walk.pose();
     ASSERT_TRUE(pose);
-    Eigen::Matrix<double, 6, 1> error;
-    const Eigen::AngleAxisd turn(pose->view_from_current.linear() * walk.view_from_current.linear().transpose());
-    error << pose->view_from_current.translation() - walk.view_from_current.translation(), turn.angle() * turn.axis();
-    normalised += error.dot(pose->covariance.llt().solve(error)) / 6.0 / WALKS;
+    normalised += test::normalisedError(*pose, walk.view_from_current) / WALKS;
   }
   // Matches of real pictures do not err independently, as these do: so there is room.
   EXPECT_LT(normalised, 1.0);

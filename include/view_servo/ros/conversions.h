@@ -7,9 +7,9 @@
 #include "view_servo/LineSegment.h"
 #include "view_servo/PointMatch.h"
 #include "view_servo/geometry/camera.h"
+#include "view_servo/geometry/camera_pose.h"
 #include "view_servo/geometry/line_segment.h"
 #include "view_servo/tracking/plane_tracker.h"
-#include "view_servo/views/structure_pose.h"
 #include "view_servo/views/view_match.h"
 #include "view_servo/views/view_store.h"
 
@@ -90,8 +90,8 @@ sensor_msgs::RegionOfInterest toRegionOfInterest(const cv::Rect& rect);
 ViewPose toViewPose(const geometry_msgs::TransformStamped& transform);
 /** The pose in its own frame, ViewPose::frame. */
 geometry_msgs::PoseStamped toPoseStamped(const ViewPose& pose, const ros::Time& stamp);
-/** Of StructurePose::view_from_current. */
-geometry_msgs::PoseWithCovariance toPoseWithCovariance(const StructurePose& pose);
+/** Of CameraPose::view_from_current. */
+geometry_msgs::PoseWithCovariance toPoseWithCovariance(const CameraPose& pose);
 
 /** The matches in the same order; places in pixels, as they are. */
 std::vector<PointMatch> toPointMatches(const std::vector<MatchedPoint>& matches);

@@ -80,6 +80,12 @@ public:
    */
   const PlaneTrack& add(const cv::Mat& raw, const std::optional<Eigen::Isometry3d>& camera_in_odom);
 
+  /** TargetTracker::cameraPose(). */
+  std::optional<CameraPose> cameraPose() const
+  {
+    return tracker_->cameraPose();
+  }
+
   /** What is known after the last image, without its header, the camera's pose, and the way that it has gone. */
   PlaneScene scene() const;
 

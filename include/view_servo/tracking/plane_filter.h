@@ -2,6 +2,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include "view_servo/geometry/camera_pose.h"
 #include "view_servo/geometry/euclidean_homography.h"
 #include "view_servo/parameters/parameter.h"
 
@@ -16,6 +17,8 @@
 
 namespace view_servo
 {
+struct OdometryScale;
+
 /** Options of the filter of planes and motions. */
 struct PlaneFilterParams
 {
@@ -86,6 +89,15 @@ public:
     return estimate_;
   }
 
+  /**
+   * Where the camera was at the last measurement. The covariance is what the noise of images and odometry lets one expect,
+   * that of the plane's normal and distance included; calibration and mounting are taken for exact.
+   * @param k, seen as in add(), of the last measurement. @param rms of those points from where its homography sends
+   * them [px].
+   * @return empty while the distance is not known, the estimate is ambiguous or the last measurement contradicts it.
+   */
+  std::optional<CameraPose> cameraPose(const Eigen::Matrix3d& k, const Points& seen, double rms) const;
+
 private:
   struct Measurement
   {
@@ -107,6 +119,8 @@ private:
     }
     /** Mean squared angle of the normals from their mean [rad²]. */
     double scatter() const;
+    /** Standard deviation of normal() in either direction [rad]. */
+    double deviation() const;
   };
 
   void followNormals(const std::vector<EuclideanHomography>& solutions);
@@ -118,9 +132,12 @@ private:
   /** Whether a measurement is where odometry moves a motion that was seen at another pose of the camera. */
   bool agrees(const Measurement& measurement, const EuclideanHomography& motion,
               const Eigen::Isometry3d& camera_in_odom) const;
+  /** The motions of all measurements, moved by odometry into the last camera's frame, if the plane were this one. */
+  std::vector<EuclideanHomography> motionsNow(const Eigen::Vector3d& normal, double distance) const;
   /** The plane's normal in the reference camera's frame; the optical axis while it is not known. */
   Eigen::Vector3d normal() const;
-  std::optional<double> distance() const;
+  /** The plane's distance, if its normal were this one. */
+  std::optional<OdometryScale> distance(const Eigen::Vector3d& normal) const;
 
   PlaneFilterParams params_;
   std::vector<Track> tracks_;             // none, one or two; the likelier first

@@ -87,6 +87,9 @@ public:
     return track_;
   }
 
+  /** PlaneFilter::cameraPose() after the last image; empty unless the plane is tracked in it. */
+  std::optional<CameraPose> cameraPose() const;
+
   /** The corners of the stored view that are tracked [px]. */
   const std::vector<Eigen::Vector2d>& points() const
   {

@@ -70,6 +70,12 @@ public:
     return track_;
   }
 
+  /**
+   * Where the camera is by the last image. The covariance is what sightings, depths and the unit's length let one
+   * expect; calibration and odometry are taken for exact. Empty unless the scene is tracked and the unit's length known.
+   */
+  std::optional<CameraPose> cameraPose() const;
+
   /** The corners of the stored view that are tracked [px]. */
   const std::vector<Eigen::Vector2d>& points() const;
 

@@ -70,6 +70,9 @@ public:
     return track_;
   }
 
+  /** Where the camera is by the last image, see PlaneFilter::cameraPose() and SceneTracker::cameraPose(). */
+  std::optional<CameraPose> cameraPose() const;
+
   /** Whether the scene is what is followed. */
   bool followsScene() const
   {

@@ -3,25 +3,19 @@
 #pragma once
 
 #include "view_servo/geometry/camera.h"
+#include "view_servo/geometry/camera_pose.h"
 #include "view_servo/views/view_match.h"
 #include "view_servo/views/view_store.h"
 #include "view_servo/views/view_structure.h"
-
-#include <Eigen/Core>
-#include <Eigen/Geometry>
 
 #include <cstddef>
 #include <optional>
 
 namespace view_servo
 {
-/** Where a camera is, seen from a stored view. */
-struct StructurePose
+/** Where a camera is, by points of a stored view whose depths are known. */
+struct StructurePose : CameraPose
 {
-  /** Points of the current camera's optical frame -> of the optical frame of the view's camera [m]. */
-  Eigen::Isometry3d view_from_current = Eigen::Isometry3d::Identity();
-  /** Of x, y, z [m] and of rotations about the view's x, y, z axes [rad], as in geometry_msgs/PoseWithCovariance. */
-  Eigen::Matrix<double, 6, 6> covariance = Eigen::Matrix<double, 6, 6>::Zero();
   std::size_t inliers = 0;  ///< points of known depth that agree with it
 };
 
