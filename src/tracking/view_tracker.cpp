@@ -61,7 +61,9 @@ public:
       return;
     }
     cv::Mat small;
-    cv::resize(image, small, cv::Size(), scale, scale, cv::INTER_AREA);
+    const cv::Size size(static_cast<int>(std::lround(scale * image.cols)),
+                        static_cast<int>(std::lround(scale * image.rows)));
+    cv::resize(image, small, size, 0.0, 0.0, cv::INTER_AREA);  // by the ratios of whole pixels, not exactly `scale`
     scale_u_ = static_cast<double>(small.cols) / image.cols;
     scale_v_ = static_cast<double>(small.rows) / image.rows;
     image_ = cv::Mat();  // a buffer of its own
