@@ -321,7 +321,7 @@ protected:
         correctScale(camera, result.pose);
         if (params_.check_motion)
         {
-          watch_.add(toIsometry(camera), toIsometry(result.pose), scale_);
+          watchPlace(camera, result.pose);
         }
         report_.inliers = result.supporting;
         report_.confidence = static_cast<double>(result.supporting) / result.looked_for;
@@ -336,7 +336,7 @@ protected:
         follow(stamp, averageAtRest(*base, view));
         view_covariance_ = inOdometry(result, camera.yaw);
         supporters_ = result.supporters;
-        if (result.displacement <= IN_PLACE)
+        if (result.displacement <= IN_PLACE && watch_.trusted())
         {
           in_place_ = *view_in_odom_;
         }
@@ -500,7 +500,7 @@ private:
     {
       watch_.restart(toIsometry(*view_in_odom_));
     }
-    scale_ = 1.0;
+    scale_ = trusted_scale_ = 1.0;
     scale_corrections_ = from_view ? ENOUGH_CORRECTIONS : 0;
     scale_variance_ = 0.0;
     trail_.clear();
@@ -579,6 +579,24 @@ private:
     constexpr double MAX_CHANGE = 4.0;
     constexpr double MAX_SCALE = 20.0;
     const PlanarPose camera_in_view = inverse(view_in_camera);
+  /**
+   * What does not move as the base does makes the unit of the structure wrong, too, which is what it was before then.
+   */
+  void watchPlace(const PlanarPose& camera_in_odom, const PlanarPose& view_in_camera)
+  {
+    const bool contradicted = watch_.contradicted();
+    watch_.add(toIsometry(camera_in_odom), toIsometry(view_in_camera), contradicted ? trusted_scale_ : scale_);
+    if (watch_.trusted())
+    {
+      trusted_scale_ = scale_;
+    }
+    else if (contradicted && !watch_.contradicted())
+    {
+      scale_ = trusted_scale_;
+      trail_.clear();
+    }
+  }
+
     trail_.push_back({ camera_in_odom, camera_in_view });
     while (trail_.size() > 2 && compose(inverse(trail_[1].in_odom), camera_in_odom).distance() > LONGEST)
     {
@@ -609,7 +627,7 @@ private:
       return;
     }
     const PlanarPose goal = reportGoal(base);
-    report_.at_view = false;
+    report_.at_view = report_.contradicted = false;
     const bool blank = std::isnan(report_.similarity);
     const double unseen = stamp - last_trace_;
     if (!law_->failure().empty())
@@ -648,6 +666,7 @@ private:
     {
       within_since_ = NOT_A_NUMBER;
       setState(HomingState::APPROACHING, "the heading is known");
+      report_.contradicted = true;
       return;
     }
     judgePlace(stamp, goal);
@@ -708,6 +727,7 @@ private:
     {
       within_since_ = NOT_A_NUMBER;
     }
+        report_.contradicted = true;
     else if (std::isnan(within_since_))
     {
       within_since_ = stamp;
@@ -795,6 +815,7 @@ private:
   double doubted_since_ = NOT_A_NUMBER;       // of the first at the view that watch_ does not trust
   std::optional<Course> test_;                // the step back, from when the view was doubted until it is trusted
   bool tested_ = false;                       // the step back has been made
+  double trusted_scale_ = 1.0;                                 // what it was when the view last moved as the base did
   bool tracked_ = false;                      // in the last image
   bool blind_ = true;                         // what was followed last were matches
   double last_known_ = 0.0;                   // last_trace_ when the law of approach was told of it

@@ -74,6 +74,10 @@ void RouteGuide::addReport(const HomingReport& report, const PlanarPose& base)
   found_ = report.state == HomingState::APPROACHING || report.state == HomingState::NEAR ||
            report.state == HomingState::DOCKING || report.state == HomingState::ARRIVED;
   due_ = false;
+  if (report.contradicted)
+  {
+    goal_.reset();  // it came from a picture that is not the view's, and nobody goes on towards it
+  }
   if (!found_)
   {
     return;

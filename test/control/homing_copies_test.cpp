@@ -35,7 +35,7 @@ class HomingCopiesTest : public testing::TestWithParam<BaseKind>
 TEST_P(HomingCopiesTest, DoesNotArriveAtAPictureHeldBeforeTheCamera)
 {
   const Walls walls;
-  for (const double distance : { 0.55, 0.4, 0.2, 0.1, 0.05, 0.03 })
+  for (const double distance : { 0.55, 0.46, 0.4, 0.3, 0.2, 0.1, 0.05, 0.03 })
   {
     Drive run(walls, paramsOf(GetParam()), { -0.5, -0.2, 0.1 });
     approach(run, distance);
@@ -50,7 +50,7 @@ TEST_P(HomingCopiesTest, DoesNotArriveAtAPictureHeldBeforeTheCamera)
 TEST_P(HomingCopiesTest, GoesOnWhenThePictureIsTakenAway)
 {
   const Walls walls;
-  for (const double distance : { 0.4, 0.1 })
+  for (const double distance : { 0.46, 0.4, 0.3, 0.2, 0.1 })
   {
     Drive run(walls, paramsOf(GetParam()), { -0.5, -0.2, 0.1 });
     approach(run, distance);
@@ -73,6 +73,7 @@ TEST_P(HomingCopiesTest, StandsWhenTheCameraSendsOneImageAgainAndAgain)
     const PlanarPose before = run.base();
     run.runFor(40.0, Drive::Sight::FROZEN);
     EXPECT_EQ(run.report().state, HomingState::FAILED) << distance << ": " << run.report().reason;
+    EXPECT_TRUE(run.report().contradicted) << run.report().reason;
     EXPECT_LT(compose(inverse(before), run.base()).distance(), FARTHEST) << distance << ": " << run.report().reason;
   }
 }

@@ -122,8 +122,21 @@ TEST(PlaceWatch, TrustsAgainAfterTheCameraHasMovedBeforeTheView)
   ASSERT_FALSE(watch.trusted());
   watch.add(at(-0.2, 0.0, -0.06), at(-0.2, 0.0, -0.06).inverse(), 1.0);  // the picture is gone
   EXPECT_FALSE(watch.trusted());
+  watch.add(at(-0.2, 0.0, -0.06), at(-0.2, 0.0, -0.06).inverse(), 1.0);
   watch.add(at(-0.15, 0.0, -0.05), at(-0.15, 0.0, -0.05).inverse(), 1.0);
   EXPECT_TRUE(watch.trusted());
+}
+
+/** A tracker that is turned to another picture may be halfway there in the first image. */
+TEST(PlaceWatch, DoesNotTakeItselfForMovedByWhatIsNotYetThere)
+{
+  PlaceWatch watch(LIMITS);
+  approach(watch, -0.2, 1.0);
+  watch.add(at(-0.16, 0.0, -0.05), at(0.01, 0.0, 0.0), 1.0);
+  watch.add(at(-0.13, 0.0, -0.04), HERE, 1.0);
+  EXPECT_FALSE(watch.trusted());
+  watch.add(at(-0.11, 0.0, -0.04), HERE, 1.0);
+  EXPECT_FALSE(watch.trusted());
 }
 
 TEST(PlaceWatch, IsContradictedByAPictureThatStaysOrGoesTheOtherWay)
@@ -188,6 +201,7 @@ TEST(PlaceWatch, IsNotSureAfterARestartElsewhere)
   watch.restart(at(0.002, 0.0, 0.0));
   watch.add(at(-0.1, 0.0, 0.0), at(5.0, 0.0, 0.0), 1.0);
   EXPECT_FALSE(watch.trusted());
+  watch.add(at(-0.1, 0.0, 0.0), at(5.0, 0.0, 0.0), 1.0);
   watch.add(at(-0.05, 0.0, 0.0), at(4.95, 0.0, 0.0), 1.0);
   EXPECT_TRUE(watch.trusted());
 }

@@ -126,6 +126,22 @@ TEST(RouteGuide, GoesOnWhereThePointsAreInPlace)
   EXPECT_NEAR(course->view.x, 1.0 + 0.3 + 0.5, 1e-12);
 }
 
+/** A picture of the view, or a camera that sends one image again and again, is no place to go on to. */
+TEST(RouteGuide, DoesNotLeadToWhatDoesNotMoveAsTheBaseDoes)
+{
+  RouteGuide guide(RouteGuideParams(), makeRoute().stops, 0.1);
+  const PlanarPose base{ 1.0, 1.0, 0.0 };
+  guide.addOdometry(base);
+  guide.addReport(trackedReport(base, compose(base, { 2.0, 0.0, 0.0 }), true), base);
+  HomingReport lost;
+  lost.state = HomingState::LOST;
+  guide.addReport(lost, base);
+  EXPECT_TRUE(guide.blindCourse()) << "the view is only hidden";
+  lost.contradicted = true;
+  guide.addReport(lost, base);
+  EXPECT_FALSE(guide.blindCourse());
+}
+
 TEST(RouteGuide, LeadsByOdometryWithinBounds)
 {
   RouteGuideParams params;

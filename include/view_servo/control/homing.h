@@ -84,7 +84,9 @@ struct HomingReport
   HomingState state = HomingState::ACQUIRING;
   std::string reason;     ///< why it is in this state, in one line
   std::string manoeuvre;  ///< what a base that cannot slide does at the moment; empty: nothing worth a word
-  bool at_view = false;   ///< the base is within arrival_distance and arrival_yaw, and the image looks like the view
+  bool contradicted =
+      false;             ///< what is seen does not move as the base does: it is not the view, or not where it seems
+  bool at_view = false;  ///< the base is within arrival_distance and arrival_yaw, and the image looks like the view
   /**
    * Direction in base_link to the base's position at the view: 0 = straight ahead, positive to the left [rad],
    * (-pi, pi]. Mode SERVO: predicted by odometry while the view is not found.

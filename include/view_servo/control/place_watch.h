@@ -51,8 +51,8 @@ public:
 
   /**
    * Whether the view may be taken for reached. False from the moment when its place jumps, or when it does not move as
-   * the camera does, until the camera has moved before it and it does. True before the first sight: a camera may be at
-   * the view.
+   * the camera does, until the camera has moved before it and it does, from the sight after the jump on. True before the
+   * first sight: a camera may be at the view.
    */
   bool trusted() const
   {
@@ -103,6 +103,7 @@ private:
   std::optional<Sight> last_;  // empty at first, and after restart()
   Sight proof_from_;
   std::optional<Eigen::Isometry3d> believed_;  // by restart()
+  bool is_new_ = false;                        // the last sight was of another place than the one before
   bool trusted_ = true;
   bool interrupted_ = false;
   Doubt doubtful_way_;
