@@ -21,7 +21,8 @@ namespace view_servo
 {
 namespace
 {
-constexpr double ODOMETRY_KEPT = 10.0;  // [s]
+constexpr double ODOMETRY_KEPT = 10.0;    // [s]
+constexpr double ODOMETRY_BEHIND = 0.45;  // of an image, at most; nodes refuse more [s]
 constexpr PlaceWatchLimits PLACE_LIMITS{ 0.015, 0.02, 0.04, 0.03, 0.2, 0.15 };
 
 const char* const MOVES_OTHERWISE = "the picture does not move as the base does by odometry";
@@ -117,6 +118,10 @@ protected:
     {
       return;
     }
+    if (moving_)
+    {
+      last_trace_ = std::max(last_trace_, stamp);  // matches count only where the base stands, however long it is held
+    }
     if (stamp - last_trace_ > params_.lost_timeout)
     {
       moving_ = false;
@@ -124,7 +129,7 @@ protected:
                report_.state == HomingState::ACQUIRING ? "the view was not found" : "the view was lost");
       return;
     }
-    const std::optional<PlanarPose> base = odometry_.at(stamp);
+    const std::optional<PlanarPose> base = odometry_.at(stamp, ODOMETRY_BEHIND);
     if (!base || moving_)
     {
       last_base_.reset();
@@ -303,13 +308,17 @@ protected:
 
   void onImage(double stamp, const cv::Mat& grey) override
   {
-    const std::optional<PlanarPose> base = odometry_.at(stamp);
-    if (!base || ended())
+    if (ended())
+    {
+      return;
+    }
+    tracked_ = report_.tracked = false;
+    const std::optional<PlanarPose> base = odometry_.at(stamp, ODOMETRY_BEHIND);
+    if (!base)
     {
       return;
     }
     const PlanarPose camera = compose(*base, target_.mount.on_base);
-    tracked_ = report_.tracked = false;
     if (tracker_.hasStructure() && view_in_odom_)
     {
       const PlanarPose predicted = compose(inverse(camera), *view_in_odom_);
@@ -570,15 +579,6 @@ private:
     }
   }
 
-  /** The unit of the structure, from how far odometry says the camera has moved within it. */
-  void correctScale(const PlanarPose& camera_in_odom, const PlanarPose& view_in_camera)
-  {
-    constexpr double LONGEST = 0.3;    // of the motion compared: near the end, recent motion counts [m]
-    constexpr double SHORTEST = 0.08;  // [m]
-    constexpr double WEIGHT = 0.2;
-    constexpr double MAX_CHANGE = 4.0;
-    constexpr double MAX_SCALE = 20.0;
-    const PlanarPose camera_in_view = inverse(view_in_camera);
   /**
    * What does not move as the base does makes the unit of the structure wrong, too, which is what it was before then.
    */
@@ -597,6 +597,15 @@ private:
     }
   }
 
+  /** The unit of the structure, from how far odometry says the camera has moved within it. */
+  void correctScale(const PlanarPose& camera_in_odom, const PlanarPose& view_in_camera)
+  {
+    constexpr double LONGEST = 0.3;    // of the motion compared: near the end, recent motion counts [m]
+    constexpr double SHORTEST = 0.08;  // [m]
+    constexpr double WEIGHT = 0.2;
+    constexpr double MAX_CHANGE = 4.0;
+    constexpr double MAX_SCALE = 20.0;
+    const PlanarPose camera_in_view = inverse(view_in_camera);
     trail_.push_back({ camera_in_odom, camera_in_view });
     while (trail_.size() > 2 && compose(inverse(trail_[1].in_odom), camera_in_odom).distance() > LONGEST)
     {
@@ -657,6 +666,7 @@ private:
     }
     else
     {
+      report_.contradicted = true;
       within_since_ = NOT_A_NUMBER;
       contradicted_since_ = std::fmin(contradicted_since_, stamp);
       giveUpAfter(stamp, contradicted_since_, MOVES_OTHERWISE, HomingState::LOST, MOVES_OTHERWISE);
@@ -666,7 +676,6 @@ private:
     {
       within_since_ = NOT_A_NUMBER;
       setState(HomingState::APPROACHING, "the heading is known");
-      report_.contradicted = true;
       return;
     }
     judgePlace(stamp, goal);
@@ -718,6 +727,7 @@ private:
       }
       else
       {
+        report_.contradicted = true;
         giveUpAfter(stamp, doubted_since_, MOVES_OTHERWISE, HomingState::LOST, MOVES_OTHERWISE);
       }
       return;
@@ -727,7 +737,6 @@ private:
     {
       within_since_ = NOT_A_NUMBER;
     }
-        report_.contradicted = true;
     else if (std::isnan(within_since_))
     {
       within_since_ = stamp;
@@ -806,6 +815,7 @@ private:
   std::unique_ptr<ApproachLaw> law_;
   std::optional<PlanarPose> view_in_odom_;                     // the view's level camera
   double scale_ = 1.0;                                         // metres in a unit of the tracker's
+  double trusted_scale_ = 1.0;                                 // what it was when the view last moved as the base did
   int scale_corrections_ = 0;                                  // of it, by odometry
   double scale_variance_ = 0.0;                                // of the parts by which the last ones changed it
   Eigen::Matrix3d view_covariance_ = Eigen::Matrix3d::Zero();  // of the view's place in odometry's frame [m, rad]
@@ -815,7 +825,6 @@ private:
   double doubted_since_ = NOT_A_NUMBER;       // of the first at the view that watch_ does not trust
   std::optional<Course> test_;                // the step back, from when the view was doubted until it is trusted
   bool tested_ = false;                       // the step back has been made
-  double trusted_scale_ = 1.0;                                 // what it was when the view last moved as the base did
   bool tracked_ = false;                      // in the last image
   bool blind_ = true;                         // what was followed last were matches
   double last_known_ = 0.0;                   // last_trace_ when the law of approach was told of it
@@ -913,7 +922,7 @@ Homing::Homing(const HomingParams& params, HomingTarget target)
 
 void Homing::addMatches(double stamp, const HeadingEvidence& pixels)
 {
-  const std::optional<PlanarPose> base = odometry_.at(stamp);
+  const std::optional<PlanarPose> base = odometry_.at(stamp, ODOMETRY_BEHIND);
   if (!base)
   {
     return;
