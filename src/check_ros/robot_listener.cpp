@@ -144,8 +144,8 @@ std::string OdometryListener::adviceOn(double remaining)
 
 JointListener::JointListener(const ros::NodeHandle& nh, const Setup& setup)
   : topic_(nh.resolveName(setup.joint_states)),
-    described_(movableJoints(nh.param<std::string>("robot_description", ""))),
-    guard_(jointLimits(nh.param<std::string>("robot_description", "")), 0.0, 1.0)
+    described_(movableJoints(robotDescription(nh))),
+    guard_(jointLimits(robotDescription(nh)), 0.0, 1.0)
 {
   subscriber_ = listen<sensor_msgs::JointState>(nh, topic_, [this](const sensor_msgs::JointState& m) { onJoints(m); });
 }

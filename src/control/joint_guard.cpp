@@ -15,6 +15,44 @@ JointGuard::JointGuard(std::map<std::string, JointLimits> limits, double margin,
 {
 }
 
+void JointGuard::begin(std::set<std::string> carrying)
+{
+  carrying_ = std::move(carrying);
+  joints_.clear();
+  stuck_since_.clear();
+}
+
+bool JointGuard::tells(const std::vector<std::string>& names, const std::vector<double>& positions) const
+{
+  const bool any = !carrying_ || carrying_->empty();
+  for (std::size_t i = 0; i < names.size() && i < positions.size(); ++i)
+  {
+    if (limits_.count(names[i]) > 0 && (any || carrying_->count(names[i]) > 0))
+    {
+      return true;
+    }
+  }
+  return false;
+}
+
+bool JointGuard::watched(const std::string& name, const Joint& joint) const
+{
+  constexpr double MOVED = 2e-3;  // [rad] or [m]
+  if (!carrying_)
+  {
+    return true;
+  }
+  return carrying_->empty() ? std::abs(joint.position - joint.first) > MOVED : carrying_->count(name) > 0;
+}
+
+std::string JointGuard::silent(double time) const
+{
+  const auto found = std::find_if(joints_.begin(), joints_.end(), [&](const auto& entry) {
+    return time - entry.second.time > max_age_ && watched(entry.first, entry.second);
+  });
+  return found == joints_.end() ? "" : found->first;
+}
+
 std::string JointGuard::add(double time, const std::vector<std::string>& names, const std::vector<double>& positions,
                             const std::vector<double>& velocities)
 {
@@ -37,8 +75,8 @@ std::string JointGuard::add(double time, const std::vector<std::string>& names, 
       unbelievable = "joint '" + names[i] + text;
       continue;
     }
-    Joint joint{ time, positions[i], 0.0 };
     const auto before = joints_.find(names[i]);
+    Joint joint{ time, positions[i], 0.0, before == joints_.end() ? positions[i] : before->second.first };
     if (velocities.size() == positions.size())
     {
       joint.velocity = velocities[i];
@@ -64,7 +102,7 @@ std::string JointGuard::problem(double time)
     const bool high = joint.position > limits.upper - margin_;
     const double outwards = low ? -joint.velocity : joint.velocity;
     const bool old = time - joint.time > max_age_;
-    if (old || (!low && !high) || outwards < -STANDS)
+    if (old || (!low && !high) || outwards < -STANDS || !watched(name, joint))
     {
       stuck_since_.erase(name);
       continue;

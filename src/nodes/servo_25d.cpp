@@ -158,14 +158,18 @@ public:
     : context_(context),
       params_(params),
       live_(params.servo),
-      joints_(jointLimits(context.nodeHandle().param<std::string>("robot_description", "")), params.joint_margin,
-              params.joint_timeout),
+      description_(robotDescription(context.nodeHandle())),
+      joints_(jointLimits(description_), params.joint_margin, params.joint_timeout),
       homographies_(context.addInput("homography", context.quoted("homography"), params.homography_timeout)),
       joint_states_(context.addInput("joint states", context.quoted("joint_states"), params.joint_timeout)),
       store_(viewsDir(params.views_dir)),
       answer_("homographies", context.resolved("homography"))
   {
     context.addLive(liveNumbers());
+    if (description_.empty())
+    {
+      ROS_WARN("there is no parameter robot_description: joint limits are not watched");
+    }
     ros::NodeHandle& nh = context.nodeHandle();
     command_publisher_ = nh.advertise<geometry_msgs::TwistStamped>(context.commandTopic(), 1);
     error_publisher_ = nh.advertise<ServoError>("servo_error", 5);
@@ -217,7 +221,7 @@ public:
     task_->start = Clock::now();
     homographies_.setNeeded(true);
     camera_frame_ = withoutSlash(info_->header.frame_id);
-    joints_.clearStuck();
+    joints_.begin(jointsMoving(description_, camera_frame_));
     joint_states_.setNeeded(joint_states_.fresh());
     onCameraInfo(info_);  // it may have changed since
   }
@@ -441,11 +445,16 @@ private:
 
   void onJoints(const sensor_msgs::JointState& message)
   {
-    if (joints_.empty())
+    if (!joints_.tells(message.name, message.position))
     {
-      return;
+      return;  // a gripper's, perhaps
     }
-    const std::string problem = joints_.add(steadySeconds(), message.name, message.position, message.velocity);
+    const double now = steadySeconds();
+    std::string problem = joints_.add(now, message.name, message.position, message.velocity);
+    if (const std::string silent = joints_.silent(now); problem.empty() && !silent.empty())
+    {
+      problem = "joint '" + silent + "' does not come any more";
+    }
     problem.empty() ? joint_states_.accept() : joint_states_.reject(problem + " on " + context_.quoted("joint_states"));
   }
 
@@ -542,7 +551,8 @@ private:
 
   DriverContext& context_;
   const Params params_;
-  Servo25dParams live_;  // with what people have changed since
+  Servo25dParams live_;            // with what people have changed since
+  const std::string description_;  // URDF; empty: none
   JointGuard joints_;
   DriverInput& homographies_;
   DriverInput& joint_states_;

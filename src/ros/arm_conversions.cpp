@@ -7,6 +7,7 @@
 #include "view_servo/geometry/region.h"
 #include "view_servo/parameters/numbers.h"
 #include "view_servo/ros/conversions.h"
+#include "view_servo/ros/transform_source.h"
 
 #include <ros/console.h>
 #include <urdf_parser/urdf_parser.h>
@@ -131,6 +132,37 @@ std::map<std::string, JointLimits> jointLimits(const std::string& urdf_xml)
     }
   }
   return limits;
+}
+
+std::set<std::string> jointsMoving(const std::string& urdf_xml, const std::string& frame)
+{
+  std::set<std::string> names;
+  const urdf::ModelInterfaceSharedPtr model = urdf_xml.empty() ? nullptr : urdf::parseURDF(urdf_xml);
+  if (!model)
+  {
+    return names;
+  }
+  urdf::LinkConstSharedPtr link = model->getLink(withoutSlash(frame));
+  link = link ? link : model->getLink(frame.substr(frame.rfind('/') + 1));
+  for (; link && link->parent_joint; link = link->getParent())
+  {
+    if (link->parent_joint->type != urdf::Joint::FIXED)
+    {
+      names.insert(link->parent_joint->name);
+    }
+  }
+  return names;
+}
+
+std::string robotDescription(const ros::NodeHandle& nh)
+{
+  std::string key;
+  std::string text;
+  if (nh.searchParam("robot_description", key))
+  {
+    nh.getParam(key, text);
+  }
+  return text;
 }
 
 std::set<std::string> movableJoints(const std::string& urdf_xml)

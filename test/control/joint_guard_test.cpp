@@ -5,7 +5,9 @@
 #include <gtest/gtest.h>
 
 #include <limits>
+#include <set>
 #include <string>
+#include <vector>
 
 namespace view_servo
 {
@@ -84,6 +86,40 @@ TEST_F(JointGuardTest, ForgetsWhatIsOld)
   at(0.0, 1.99, 0.1);
   EXPECT_NE(guard_.problem(0.9), "");
   EXPECT_EQ(guard_.problem(1.1), "");
+}
+
+/** A gripper rests at a limit for as long as it holds something. */
+TEST(JointGuard, LetsAGripperRestAtItsLimit)
+{
+  const std::vector<std::string> names{ "elbow", "finger" };
+  for (const std::set<std::string>& carrying : { std::set<std::string>{ "elbow" }, std::set<std::string>{} })
+  {
+    JointGuard guard({ { "elbow", { -1.0, 2.0 } }, { "finger", { 0.0, 0.04 } } }, 0.02, 1.0);
+    guard.begin(carrying);
+    guard.add(0.0, names, { 1.0, 0.0 }, {});
+    guard.add(0.1, names, { 1.1, 0.0 }, {});
+    EXPECT_EQ(guard.problem(0.1), "");
+    EXPECT_EQ(guard.problem(0.5), "") << "the finger stands at its limit";
+    guard.add(0.6, names, { 1.99, 0.0 }, { 0.1, 0.0 });
+    EXPECT_NE(guard.problem(0.6).find("'elbow' is at 1.990"), std::string::npos);
+    guard.begin(carrying);
+    EXPECT_EQ(guard.problem(0.7), "") << "what was heard before the goal does not count";
+  }
+}
+
+TEST(JointGuard, KnowsWhichMessagesTellOfTheArm)
+{
+  JointGuard guard({ { "elbow", { -1.0, 2.0 } }, { "finger", { 0.0, 0.04 } } }, 0.02, 1.0);
+  EXPECT_TRUE(guard.tells({ "finger" }, { 0.0 }));
+  guard.begin({ "elbow" });
+  EXPECT_FALSE(guard.tells({ "finger" }, { 0.0 }));
+  EXPECT_TRUE(guard.tells({ "finger", "elbow" }, { 0.0, 0.0 }));
+  EXPECT_FALSE(guard.tells({ "finger", "elbow" }, {})) << "positions are missing";
+  guard.add(0.0, { "elbow", "finger" }, { 0.0, 0.0 }, {});
+  EXPECT_EQ(guard.silent(0.9), "");
+  EXPECT_EQ(guard.silent(1.1), "elbow");
+  guard.begin({ "elbow" });
+  EXPECT_EQ(guard.silent(9.0), "") << "it has not been heard of since";
 }
 
 }  // namespace

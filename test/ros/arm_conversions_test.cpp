@@ -119,5 +119,24 @@ TEST(JointLimits, AreThoseOfTheRobot)
   EXPECT_EQ(limits.at("elbow").upper, 2.0);
 }
 
+TEST(JointsMoving, AreThoseBetweenTheLinkAndTheRoot)
+{
+  const std::string urdf = R"(<robot name="arm"><link name="a"/><link name="b"/><link name="c"/><link name="finger"/>
+    <link name="camera"/>
+    <joint name="elbow" type="revolute"><parent link="a"/><child link="b"/>
+      <limit lower="-1" upper="2" effort="1" velocity="1"/></joint>
+    <joint name="wrist" type="continuous"><parent link="b"/><child link="c"/></joint>
+    <joint name="mount" type="fixed"><parent link="c"/><child link="camera"/></joint>
+    <joint name="grip" type="prismatic"><parent link="c"/><child link="finger"/>
+      <limit lower="0" upper="0.04" effort="1" velocity="1"/></joint></robot>)";
+  const std::set<std::string> arm{ "elbow", "wrist" };
+  EXPECT_EQ(jointsMoving(urdf, "camera"), arm);
+  EXPECT_EQ(jointsMoving(urdf, "/camera"), arm);
+  EXPECT_EQ(jointsMoving(urdf, "left/camera"), arm);
+  EXPECT_EQ(jointsMoving(urdf, "finger").count("grip"), 1U);
+  EXPECT_TRUE(jointsMoving(urdf, "elsewhere").empty());
+  EXPECT_TRUE(jointsMoving("", "camera").empty());
+}
+
 }  // namespace
 }  // namespace view_servo

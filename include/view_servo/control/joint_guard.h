@@ -3,6 +3,8 @@
 #pragma once
 
 #include <map>
+#include <optional>
+#include <set>
 #include <string>
 #include <vector>
 
@@ -27,6 +29,19 @@ public:
    * @param max_age a joint that was not heard of for longer is left out [s], > 0.
    */
   JointGuard(std::map<std::string, JointLimits> limits, double margin, double max_age);
+
+  /**
+   * A new goal begins: what was heard of joints before is forgotten.
+   * @param carrying joints that move the camera, which alone are watched from now on; a gripper's may rest at a limit.
+   * Empty: they are not known, and any joint is watched that has moved since.
+   */
+  void begin(std::set<std::string> carrying);
+
+  /** Whether a message says where a watched joint is. Arguments as of add(). */
+  bool tells(const std::vector<std::string>& names, const std::vector<double>& positions) const;
+
+  /** Name of a watched joint that was heard of since begin(), but not for max_age; empty: there is none. */
+  std::string silent(double time) const;
 
   /**
    * Takes where joints are: a position [rad or m] for each name. Joints without limits are ignored, and some may be
@@ -61,11 +76,15 @@ private:
     double time;      // [s]
     double position;  // [rad] or [m]
     double velocity;  // [rad/s] or [m/s]
+    double first;     // position when it was heard of first
   };
+
+  bool watched(const std::string& name, const Joint& joint) const;
 
   std::map<std::string, JointLimits> limits_;
   double margin_;
   double max_age_;
+  std::optional<std::set<std::string>> carrying_;  // empty before begin(): all are watched
   std::map<std::string, Joint> joints_;
   std::map<std::string, double>
       stuck_since_;  // by joint: the time since which it is at a limit while the arm should move

@@ -9,6 +9,7 @@
 #include "view_servo/geometry/camera.h"
 #include "view_servo/views/view_store.h"
 
+#include <ros/node_handle.h>
 #include <std_msgs/Header.h>
 
 #include <map>
@@ -48,6 +49,16 @@ ServoError toServoError(const ServoReport& report, const ServoTarget& target, bo
  * be read.
  */
 std::map<std::string, JointLimits> jointLimits(const std::string& urdf_xml);
+
+/**
+ * The joints that move a link of a URDF: those between it and the root that are not fixed.
+ * @param frame the link's name, perhaps with a leading slash, or with a prefix that ends with a slash.
+ * @return empty when there is no such link.
+ */
+std::set<std::string> jointsMoving(const std::string& urdf_xml, const std::string& frame);
+
+/** The parameter `robot_description`, of a namespace or of one above it; empty when there is none. */
+std::string robotDescription(const ros::NodeHandle& nh);
 
 /** Names of a URDF's joints that can move and mimic no other; empty when the text is empty or cannot be read. */
 std::set<std::string> movableJoints(const std::string& urdf_xml);
