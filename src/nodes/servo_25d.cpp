@@ -191,8 +191,8 @@ public:
     {
       stored.push_back(store_.load(view.view));
     }
-    context_.locked([&] { answer_.expect(stored.front().name, context_.goalId()); });
-    context_.requestView(stored.front().name);
+    const std::string& first = stored.front().name;
+    context_.requestView(first, [&](const std::string& id) { answer_.expect(first, id); });
     // Only one that has come since: the camera may be another than it was.
     context_.locked([this] { info_.reset(); });
     auto task = std::make_unique<Task>();

@@ -107,11 +107,12 @@ void DriverContext::waitFor(const std::function<std::string()>& missing)
   }
 }
 
-void DriverContext::requestView(const std::string& view)
+void DriverContext::requestView(const std::string& view, const std::function<void(const std::string&)>& expect)
 {
   locked([&] {
     if (preparing())
     {
+      expect(goalId());
       publishWantedView(view, goalId());
     }
   });

@@ -104,8 +104,7 @@ LiveGroup ViewHoming::liveNumbers()
 
 CameraFrame ViewHoming::waitForInputs(const std::string& view)
 {
-  context_.locked([&] { expectView(view, context_.goalId()); });
-  context_.requestView(view);
+  context_.requestView(view, [&](const std::string& goal) { expectView(view, goal); });
   // Only an image that has come since: the camera may be another than it was.
   CameraFrame before;
   CameraFrame frame;

@@ -258,8 +258,11 @@ public:
    */
   void waitFor(const std::function<std::string()>& missing);
 
-  /** Publishes on `~wanted_view` the view of the goal that is being prepared. Only for prepare(), without the mutex. */
-  void requestView(const std::string& view);
+  /**
+   * Publishes on `~wanted_view` the view of the goal that is being prepared, if that is still wanted. Only for prepare(),
+   * without the mutex. @param expect is called just before with the goal's id, with the mutex held.
+   */
+  void requestView(const std::string& view, const std::function<void(const std::string&)>& expect);
 
   /** Publishes on `~wanted_view` that the goal goes on to another view, if there is a goal. The mutex is held. */
   void requestNextView(const std::string& view);

@@ -249,6 +249,8 @@ private:
     driver_.end();
     waiting_for_ = "the goal is being prepared";
     goal_ = Goal{ handle, order, handle.getGoalID().id, own ? order.timeout : params_.node.timeout, ++serials_ };
+    // A cancellation that came before the goal was taken matched nothing, and actionlib tells of it but once.
+    goal_->cancelled = handle.getGoalStatus().status == actionlib_msgs::GoalStatus::PREEMPTING;
     if (!gate_.open())
     {
       finish(false, "disabled: call ~enable first");
