@@ -522,7 +522,8 @@ private:
     }
     if (message.valid == 0)
     {
-      const std::string reason = message.reason.empty() ? "the view is not in the image" : message.reason;
+      const std::string reason =
+          message.reason.empty() ? "the view is not in the image" : oneLine(std::runtime_error(message.reason));
       if (task_->found)
       {
         task_->servo().addLoss(message.header.stamp.toSec(), reason);

@@ -3,6 +3,7 @@
 #include "tools/hand_eye_session.h"
 
 #include "view_servo/SetView.h"
+#include "view_servo/parameters/error_text.h"
 #include "view_servo/ros/call_service.h"
 #include "view_servo/ros/conversions.h"
 #include "view_servo/ros/image_source.h"
@@ -124,7 +125,7 @@ bool HandEyeSession::update()
     else if (!message.valid)
     {
       collector_.clear();
-      hindrance_ = "the view is not followed: " + message.reason;
+      hindrance_ = "the view is not followed: " + oneLine(std::runtime_error(message.reason));
     }
     else
     {

@@ -204,7 +204,8 @@ private:
       track.homography.h.setIdentity();
       track.plane = plane;
     }
-    Homography message = toHomography(track, wantedView().view, header, "a hand is in front of it");
+    // What a tracker says is told in one line.
+    Homography message = toHomography(track, wantedView().view, header, "a hand\nis in front of it\n");
     if (nonsense)
     {
       message.rotation.w = std::numeric_limits<double>::quiet_NaN();
