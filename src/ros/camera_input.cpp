@@ -48,19 +48,41 @@ CameraInput::CameraInput(const ros::NodeHandle& nh, const ros::NodeHandle& priva
     on_problem_(std::move(on_problem)),
     pairing_(params.queue_size),
     last_diagnosis_(ros::WallTime::now()),
-    synchronizer_(static_cast<std::uint32_t>(params.queue_size))
+    synchronizer_(makeSynchronizer())
 {
   const auto queue_size = static_cast<std::uint32_t>(params.queue_size);
   ros::NodeHandle topics_nh(nh);
-  synchronizer_.connectInput(image_subscriber_, info_subscriber_);
-  synchronizer_.registerCallback(&CameraInput::frameCallback, this);
-  image_subscriber_.registerCallback([this](const CameraImageConstPtr& image) { onImage(image->header.stamp); });
-  info_subscriber_.registerCallback(
-      [this](const sensor_msgs::CameraInfoConstPtr& info) { onInfo(info->header.stamp); });
+  image_subscriber_.registerCallback([this](const CameraImageConstPtr& image) {
+    pair([&](Synchronizer& synchronizer) { synchronizer.add0(image); });
+    onImage(image->header.stamp);
+  });
+  info_subscriber_.registerCallback([this](const sensor_msgs::CameraInfoConstPtr& info) {
+    pair([&](Synchronizer& synchronizer) { synchronizer.add1(info); });
+    onInfo(info->header.stamp);
+  });
   image_subscriber_.subscribe(nh, private_nh, "image_raw", params.image_transport, params.queue_size);
   info_subscriber_.subscribe(topics_nh, "camera_info", queue_size);
   check_timer_ =
       topics_nh.createWallTimer(ros::WallDuration(CHECK_PERIOD), [this](const ros::WallTimerEvent&) { checkInputs(); });
+}
+
+std::unique_ptr<CameraInput::Synchronizer> CameraInput::makeSynchronizer()
+{
+  auto synchronizer = std::make_unique<Synchronizer>(static_cast<std::uint32_t>(params_.queue_size));
+  synchronizer->registerCallback(&CameraInput::frameCallback, this);
+  return synchronizer;
+}
+
+void CameraInput::pair(const std::function<void(Synchronizer&)>& add)
+{
+  const std::lock_guard<std::mutex> lock(pairing_mutex_);
+  // What was left without a partner before time went back is newer than all that comes, and would be kept instead of it.
+  if (++unpaired_ > 4 * params_.queue_size)
+  {
+    synchronizer_ = makeSynchronizer();
+    unpaired_ = 1;
+  }
+  add(*synchronizer_);
 }
 
 std::string CameraInput::fault() const
@@ -175,6 +197,7 @@ void CameraInput::diagnose(diagnostic_updater::DiagnosticStatusWrapper& status)
 
 void CameraInput::frameCallback(const CameraImageConstPtr& image, const sensor_msgs::CameraInfoConstPtr& info)
 {
+  unpaired_ = 0;  // pair() holds the mutex
   guarded("an image on '" + imageTopic() + "'", [&] { onPair(image, info); });
 }
 

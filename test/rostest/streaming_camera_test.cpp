@@ -11,6 +11,7 @@
 #include <gtest/gtest.h>
 #include <ros/callback_queue.h>
 
+#include <atomic>
 #include <cstddef>
 #include <optional>
 #include <string>
@@ -137,6 +138,31 @@ TEST_F(StreamingTest, NamesBothTopicsWhenTheirStampsDifferOrOneIsSilent)
     send_image();
     send_info();
   }));
+}
+
+/** As of a bag that is played without its calibration, and then again with it. */
+TEST_F(StreamingTest, PairsAreFoundAgainAfterTimeHasGoneBack)
+{
+  std::atomic<int> frames = 0;
+  const CameraInput input(ros::NodeHandle("again"), ros::NodeHandle("~"), CameraInputParams(),
+                          [&](const CameraFrame&) { ++frames; });
+  const ros::Publisher images = ros::NodeHandle().advertise<sensor_msgs::Image>("again/image_raw", 5);
+  const ros::Publisher infos = ros::NodeHandle().advertise<sensor_msgs::CameraInfo>("again/camera_info", 5);
+  const Recorder<sensor_msgs::Image> heard("again/image_raw");
+  double time = 200.0;  // of stamps [s]
+  const auto send = [&](bool with_info) {
+    time += 0.03;
+    const sensor_msgs::CameraInfo info = FakeCamera("none").infoOf(picture_, ros::Time(time));
+    images.publish(toImage(picture_, sensor_msgs::image_encodings::MONO8, info.header));
+    if (with_info)
+    {
+      infos.publish(info);
+    }
+  };
+  ASSERT_TRUE(waitUntil([&] { return heard.messages().size() > 8; }, [&] { send(false); }));
+  EXPECT_EQ(frames, 0);
+  time = 100.0;
+  EXPECT_TRUE(waitUntil([&] { return frames > 3; }, [&] { send(true); }));
 }
 
 TEST_F(StreamingTest, CalibrationsThatAreHeardAfterAllTheirImagesAreNotMissing)

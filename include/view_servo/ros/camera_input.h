@@ -14,6 +14,7 @@
 #include <sensor_msgs/CameraInfo.h>
 
 #include <functional>
+#include <memory>
 #include <mutex>
 #include <optional>
 #include <string>
@@ -94,6 +95,11 @@ public:
   void diagnose(diagnostic_updater::DiagnosticStatusWrapper& status);
 
 private:
+  using Synchronizer = message_filters::TimeSynchronizer<CameraImage, sensor_msgs::CameraInfo>;
+
+  std::unique_ptr<Synchronizer> makeSynchronizer();
+  /** Hands a message to the synchronizer by `add`; to a new one when the old one has long found no pair. */
+  void pair(const std::function<void(Synchronizer&)>& add);
   void frameCallback(const CameraImageConstPtr& image, const sensor_msgs::CameraInfoConstPtr& info);
   void onImage(const ros::Time& stamp);
   void onInfo(const ros::Time& stamp);
@@ -109,7 +115,7 @@ private:
   Callback on_frame_;
   std::function<void(const std::string&)> on_problem_;
   mutable std::mutex waiting_mutex_;  // held by the one who waits; taken before mutex_
-  mutable std::mutex mutex_;          // guards what follows, up to the transport
+  mutable std::mutex mutex_;          // guards what follows, up to the other mutex
   CameraFrame latest_;
   std::string fault_;    // of the last pair
   std::string problem_;  // why the last frame was not usable, or none came
@@ -121,9 +127,12 @@ private:
   int frames_ = 0;     // usable, since the last diagnosis
   ros::WallTime last_diagnosis_;
 
+  std::mutex pairing_mutex_;  // guards what follows, up to the transport; taken before mutex_
+  int unpaired_ = 0;          // messages since the last pair
+  std::unique_ptr<Synchronizer> synchronizer_;
+
   CameraImageSubscriber image_subscriber_;
   message_filters::Subscriber<sensor_msgs::CameraInfo> info_subscriber_;
-  message_filters::TimeSynchronizer<CameraImage, sensor_msgs::CameraInfo> synchronizer_;
   ros::WallTimer check_timer_;
 };
 
