@@ -363,7 +363,8 @@ private:
       }
       if (frame)
       {
-        wake_.wait_until(lock, next, [this] { return stopping_ || renewed_; });
+        // The time is looked at, too: before GCC 10 such a wait goes by the system's clock, which may be set back.
+        wake_.wait_until(lock, next, [&] { return stopping_ || renewed_ || Clock::now() >= next; });
       }
     }
   }
