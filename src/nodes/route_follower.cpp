@@ -15,6 +15,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstddef>
 #include <memory>
 #include <mutex>
 #include <optional>
@@ -59,7 +60,6 @@ public:
       context_(context),
       params_(params),
       routes_(viewsDir(params.views_dir)),
-      worker_("reading the next view of a route", [this](Order&& order) { load(order); }),
       homing_(context, params_,
               { {},
                 [this] { onOdometry(); },
@@ -68,7 +68,8 @@ public:
                   storeStructure(homing_.viewStore(), outcome);
                   listenToRecognizer();
                 },
-                {} })
+                {} }),
+      worker_("reading the next view of a route", [this](Order&& order) { load(order); })
   {
   }
 
@@ -199,6 +200,16 @@ private:
     return "";
   }
 
+  /** Whether a stop is about where the route begins, after it has been elsewhere: then the whole route is meant. */
+  static bool closesALoop(const std::vector<RouteStop>& stops, std::ptrdiff_t index)
+  {
+    constexpr double NEAR = 0.5;   // [m]
+    constexpr double ALIKE = 0.5;  // [rad]
+    constexpr std::ptrdiff_t ELSEWHERE = 3;
+    const PlanarPose way = compose(inverse(stops.front().base), stops[static_cast<std::size_t>(index)].base);
+    return index >= ELSEWHERE && way.distance() < NEAR && std::abs(way.yaw) < ALIKE;
+  }
+
   /**
    * Drops the stops before the one that a recognizer sees. Nothing happens when there is no recognizer, or it sees none
    * of them within a few seconds. By a topic, as drivers call no services. Waits, without the mutex.
@@ -234,9 +245,15 @@ private:
                    [&] { return seen().empty() ? "a recognizer's answer on '" + subscriber.getTopic() + "'" : ""; });
     if (const std::string view = seen(); !view.empty())
     {
+      const auto stop =
+          std::find_if(stops.begin(), stops.end(), [&](const RouteStop& other) { return other.view == view; });
+      if (closesALoop(stops, stop - stops.begin()))
+      {
+        ROS_INFO_STREAM("view '" << view << "', which the recognizer sees, is where the route begins, too");
+        return;
+      }
       ROS_INFO_STREAM("the route begins at view '" << view << "', which the recognizer sees");
-      stops.erase(stops.begin(),
-                  std::find_if(stops.begin(), stops.end(), [&](const RouteStop& stop) { return stop.view == view; }));
+      stops.erase(stops.begin(), stop);
     }
   }
 
@@ -390,9 +407,9 @@ private:
   bool jumps_ = false;                       // the base drives to that one at once
   std::optional<ros::WallTime> lost_since_;  // the view is not found
   ros::Subscriber recognized_;               // homing's thread's alone
-  // Their threads use what is above, and each other only while a goal runs.
-  Worker<Order> worker_;
+  // Their threads use what is above, and homing's the worker, only while a goal runs; the worker may still use homing.
   ViewHoming homing_;
+  Worker<Order> worker_;
 };
 
 const NodeType ROUTE_FOLLOWER = driverType<DriverNode<RouteDriver>>("route_follower");

@@ -120,7 +120,8 @@ private:
   void onFrame(const CameraFrame& frame)
   {
     const std::lock_guard<std::mutex> lock(input_mutex_);
-    const std::optional<PlanarPose> base = history_.at(frame.image->header.stamp.toSec());
+    constexpr double BEHIND = 0.45;  // of odometry's stamps, as homing bears it [s]
+    const std::optional<PlanarPose> base = history_.at(frame.image->header.stamp.toSec(), BEHIND);
     if (base && odometry_input_.fresh())
     {
       newest_ = Place{ frame, *base };
@@ -179,10 +180,14 @@ private:
     {
       refuse("there is one of that name: delete or rename that first");
     }
-    const auto views = routes_.views().revisions();
-    if (views.count(viewNameOf(name, 1)) > 0)
+    for (const auto& [view, revision] : routes_.views().revisions())
     {
-      refuse("there is a view '" + viewNameOf(name, 1) + "' already: delete it, or take another name");
+      // Any of them, as the recording would end at it.
+      if (view.compare(0, name.size() + 1, name + "_") == 0 &&
+          view.find_first_not_of("0123456789", name.size() + 1) == std::string::npos)
+      {
+        refuse("there is a view '" + view + "' already: delete it, or take another name");
+      }
     }
     Recording recording;
     recording.route.name = name;
@@ -369,9 +374,12 @@ private:
   /** Ends the recording, and removes its views. */
   void discard()
   {
-    for (const RouteStop& stop : recording_->route.stops)
+    // The last first: should there be no time for all, a new recording of the name is refused and says why.
+    std::vector<RouteStop>& stops = recording_->route.stops;
+    for (; !stops.empty(); stops.pop_back())
     {
-      guarded("removing view '" + stop.view + "'", [&] { routes_.views().remove(stop.view); });
+      const std::string view = stops.back().view;
+      guarded("removing view '" + view + "'", [&] { routes_.views().remove(view); });
     }
     recording_.reset();
   }
