@@ -4,10 +4,10 @@
 
 #include "check/observations.h"
 #include "check/stream_meter.h"
-#include "check_ros/ros_graph.h"
 #include "check_ros/setup.h"
 #include "view_servo/ros/camera_input.h"
 #include "view_servo/ros/driver_context.h"
+#include "view_servo/ros/ros_graph.h"
 
 #include <ros/node_handle.h>
 #include <ros/subscriber.h>

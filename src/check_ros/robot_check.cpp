@@ -3,8 +3,8 @@
 #include "check_ros/robot_check.h"
 
 #include "check/judgements.h"
-#include "check_ros/ros_graph.h"
 #include "view_servo/ros/image_source.h"
+#include "view_servo/ros/ros_graph.h"
 
 #include <ros/time.h>
 

@@ -5,13 +5,13 @@
 #include "check/observations.h"
 #include "check/stream_meter.h"
 #include "check_ros/camera_listener.h"
-#include "check_ros/ros_graph.h"
 #include "check_ros/setup.h"
 #include "view_servo/control/clock_offset.h"
 #include "view_servo/control/joint_guard.h"
 #include "view_servo/control/odometry_history.h"
 #include "view_servo/ros/driver_context.h"
 #include "view_servo/ros/odometry_input.h"
+#include "view_servo/ros/ros_graph.h"
 #include "view_servo/ros/transform_source.h"
 
 #include <nav_msgs/Odometry.h>

@@ -3,13 +3,13 @@
 #include "check_ros/test_drive.h"
 
 #include "check/judgements.h"
-#include "check_ros/ros_graph.h"
 #include "view_servo/images/image_io.h"
 #include "view_servo/parameters/join.h"
 #include "view_servo/parameters/numbers.h"
 #include "view_servo/ros/conversions.h"
 #include "view_servo/ros/node_base.h"
 #include "view_servo/ros/readiness.h"
+#include "view_servo/ros/ros_graph.h"
 
 #include <algorithm>
 #include <cmath>

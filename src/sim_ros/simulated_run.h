@@ -3,6 +3,7 @@
 #pragma once
 
 #include "sim/world_reader.h"
+#include "sim_ros/command_listeners.h"
 #include "sim_ros/robot_messages.h"
 #include "sim_ros/run_command_line.h"
 #include "sim_ros/run_params.h"
@@ -65,8 +66,9 @@ public:
 
   /**
    * Waits for everything that a run needs: the ground truth and images arrive, services and the action are offered.
+   * Nobody else may listen to the commands then, see foreignListener().
    * @param others services to wait for besides those that every run calls.
-   * @throws std::runtime_error naming what is missing.
+   * @throws std::runtime_error naming what is missing, or who listens.
    */
   void waitForOthers(const std::vector<std::string>& others)
   {
@@ -101,6 +103,11 @@ public:
     const std::string why = waitUntilReady(params_.patience, missing);
     images.shutdown();
     require(why);
+    const std::string foreign = foreignListener(nh_.resolveName("cmd_vel"), nh_.resolveName(robot_));
+    if (!foreign.empty())
+    {
+      throw std::runtime_error(foreign);
+    }
   }
 
   /**

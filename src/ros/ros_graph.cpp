@@ -1,12 +1,14 @@
 // Copyright (c) 2026, the view_servo authors
 // SPDX-License-Identifier: BSD-3-Clause
-#include "check_ros/ros_graph.h"
+#include "view_servo/ros/ros_graph.h"
 
 #include <ros/master.h>
 #include <ros/this_node.h>
 #include <xmlrpcpp/XmlRpcValue.h>
 
-namespace view_servo::check
+#include <algorithm>
+
+namespace view_servo
 {
 namespace
 {
@@ -76,10 +78,23 @@ std::string RosGraph::publisher(const std::string& topic) const
   return nodes.empty() ? "" : nodes.front();
 }
 
+std::vector<std::string> RosGraph::publishedBy(const std::string& node) const
+{
+  std::vector<std::string> topics;
+  for (const auto& [topic, nodes] : publishers_)
+  {
+    if (std::find(nodes.begin(), nodes.end(), node) != nodes.end())
+    {
+      topics.push_back(topic);
+    }
+  }
+  return topics;
+}
+
 std::string RosGraph::type(const std::string& topic) const
 {
   const auto found = types_.find(topic);
   return found == types_.end() ? "" : found->second;
 }
 
-}  // namespace view_servo::check
+}  // namespace view_servo

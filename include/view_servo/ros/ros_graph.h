@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-namespace view_servo::check
+namespace view_servo
 {
 /** Which nodes publish and subscribe to which topics, as the master has it; this node is left out. */
 class RosGraph
@@ -21,6 +21,8 @@ public:
   std::vector<std::string> subscribers(const std::string& topic) const;
   /** One of the nodes that publish a topic; empty: there is none. */
   std::string publisher(const std::string& topic) const;
+  /** Topics that a node publishes. */
+  std::vector<std::string> publishedBy(const std::string& node) const;
   /** Type of a topic's messages; empty: the master does not know. */
   std::string type(const std::string& topic) const;
 
@@ -32,4 +34,4 @@ private:
   std::map<std::string, std::string> types_;
 };
 
-}  // namespace view_servo::check
+}  // namespace view_servo

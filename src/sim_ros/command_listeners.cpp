@@ -1,0 +1,48 @@
+// Copyright (c) 2026, the view_servo authors
+// SPDX-License-Identifier: BSD-3-Clause
+#include "sim_ros/command_listeners.h"
+
+#include "view_servo/ros/ros_graph.h"
+
+#include <ros/console.h>
+
+#include <algorithm>
+#include <vector>
+
+namespace view_servo
+{
+namespace
+{
+/** Whether a node only records or shows what is published. */
+bool onlyShows(const std::string& node)
+{
+  const std::vector<std::string> beginnings{ "record", "rosbag", "rostopic", "rviz", "rqt", "plot" };
+  const std::string name = node.substr(node.rfind('/') + 1);
+  return std::any_of(beginnings.begin(), beginnings.end(),
+                     [&](const std::string& beginning) { return name.compare(0, beginning.size(), beginning) == 0; });
+}
+
+}  // namespace
+
+std::string foreignListener(const std::string& topic, const std::string& robot)
+{
+  const RosGraph graph;
+  for (const std::string& node : graph.subscribers(topic))
+  {
+    if (node == robot || onlyShows(node))
+    {
+      continue;
+    }
+    const std::vector<std::string> topics = graph.publishedBy(node);
+    if (std::any_of(topics.begin(), topics.end(), [](const std::string& other) { return other != "/rosout"; }))
+    {
+      return "'" + node + "' listens on '" + topic +
+             "', too, and would move with the simulated robot: for a real robot add sim:=false; to simulate, take a "
+             "master of your own, by export ROS_MASTER_URI=http://localhost:11411";
+    }
+    ROS_WARN_STREAM("'" << node << "' listens on '" << topic << "', too: if it is a robot, it will move");
+  }
+  return "";
+}
+
+}  // namespace view_servo
