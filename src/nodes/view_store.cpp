@@ -16,10 +16,13 @@
 #include "view_servo/ros/node_type_of.h"
 #include "view_servo/ros/parameters.h"
 #include "view_servo/ros/transform_source.h"
+#include "view_servo/views/self_repetition.h"
 #include "view_servo/views/view_store.h"
 
 #include <sensor_msgs/image_encodings.h>
+#include <Eigen/Core>
 
+#include <cmath>
 #include <mutex>
 #include <optional>
 #include <stdexcept>
@@ -85,11 +88,16 @@ private:
       return store_.save(view, request.overwrite);
     }();
     const std::string lack = lackOfLight(view.region.empty() ? view.image : view.image(view.region));
+    const std::optional<Eigen::Vector2d> other = otherPlaceInPicture(view.image, view.region);
     response.success = true;
     response.message = "saved view '" + view.name + "', " + std::to_string(view.image.cols) + " x " +
                        std::to_string(view.image.rows) + (view.camera ? "" : ", without a calibration") +
                        (view.pose ? ", with its pose in " + view.pose->frame : ", without a pose") +
-                       (lack.empty() ? "" : "; but the picture is " + lack) + (warning.empty() ? "" : "; " + warning);
+                       (lack.empty() ? "" : "; but the picture is " + lack) +
+                       (other ? "; but what it shows repeats itself " + std::to_string(std::lround(other->norm())) +
+                                    " px away: it may be found there"
+                              : "") +
+                       (warning.empty() ? "" : "; " + warning);
     if (request.learn)
     {
       WantedView wanted;

@@ -5,6 +5,9 @@
 #include "check/judgements.h"
 #include "check/picture.h"
 #include "view_servo/images/image_io.h"
+#include "view_servo/views/self_repetition.h"
+
+#include <cmath>
 
 namespace view_servo
 {
@@ -22,8 +25,15 @@ RegionJudgement judgeRegion(const cv::Mat& picture, const cv::Rect& region)
   }
   std::string remedies;
   const char* separator = "";
-  for (const check::Finding& finding :
-       check::judgePicture(check::measurePicture(toGrey(picture(part).clone(), "region"))))
+  const cv::Mat grey = toGrey(picture, "picture");
+  check::Findings findings = check::judgePicture(check::measurePicture(grey(part).clone()));
+  if (const auto other = otherPlaceInPicture(grey, part))
+  {
+    findings.push_back(check::warning("repetition",
+                                      "repeats itself " + std::to_string(std::lround(other->norm())) + " px away",
+                                      "let the region show what is there only once"));
+  }
+  for (const check::Finding& finding : findings)
   {
     judgement.text += separator + finding.message;
     judgement.is_good = judgement.is_good && finding.level == check::Level::OK;

@@ -4,7 +4,10 @@
 
 #include "view_servo/geometry/correspondence.h"
 #include "view_servo/geometry/homography.h"
+#include "view_servo/geometry/line_homography.h"
+#include "view_servo/geometry/region.h"
 #include "view_servo/matching/guided_matching.h"
+#include "view_servo/views/self_repetition.h"
 
 #include <Eigen/LU>
 #include <opencv2/imgproc.hpp>
@@ -23,6 +26,7 @@ constexpr double RADIUS = 4.0;           // around where a homography sends a co
 constexpr double MIN_CORRELATION = 0.7;  // of a corner's patch that is found
 constexpr double LEAST_FOUND = 0.4;      // of the matches: too few tell nothing
 constexpr double APART = 8.0;            // nearer places are one [px]
+constexpr double EVERYWHERE = 1e5;       // [px]
 
 Eigen::Matrix3d shift(const Eigen::Vector2d& by)
 {
@@ -129,6 +133,13 @@ private:
   std::vector<Eigen::Vector2d> places_;
 };
 
+/** How another place grows from what is next to it. */
+struct Search
+{
+  std::vector<double> reaches;  ///< from the place [px]: what is so near is found first, then more
+  bool slanted;                 ///< neither image need show the plane from straight ahead: the period changes across it
+};
+
 /**
  * Some matches that are found along one homography, to be found again along another. Those that are not found there
  * would not be found elsewhere either, and tell nothing.
@@ -137,8 +148,8 @@ class Matches
 {
 public:
   Matches(const cv::Mat& reference, const cv::Mat& current, const Correspondences& all, const Eigen::Matrix3d& h,
-          double nearly)
-    : reference_(reference), current_(current), nearly_(nearly)
+          double nearly, const Search& search)
+    : reference_(reference), current_(current), nearly_(nearly), search_(search)
   {
     constexpr std::size_t MOST = 150;
     guidance_.min_correlation = MIN_CORRELATION;
@@ -163,8 +174,7 @@ public:
     constexpr double WIDER = 6.0;  // than RADIUS: the period is not the same everywhere [px]
     constexpr std::size_t FEWEST = 6;
     constexpr std::size_t MOST = 20;
-    constexpr double EVERYWHERE = 1e5;  // [px]
-    std::vector<Corner> around = near(from, 120.0);
+    std::vector<Corner> around = near(from, search_.reaches.front());
     around.resize(std::min(around.size(), MOST));
     const double here = static_cast<double>(find(around, h, RADIUS).size());
     // Either image may show the plane from straight ahead, where a period is the same everywhere.
@@ -186,10 +196,10 @@ public:
     {
       return std::nullopt;
     }
-    for (const double reach : { 240.0, EVERYWHERE, EVERYWHERE })
+    for (std::size_t i = 1; i < search_.reaches.size(); ++i)
     {
       other = improved(other, found);
-      const std::vector<Corner> within = near(from, reach);
+      const std::vector<Corner> within = near(from, search_.reaches[i]);
       found = find(within, other, RADIUS);
       if (found.size() < FEWEST || static_cast<double>(found.size()) < LEAST_FOUND * static_cast<double>(within.size()))
       {
@@ -212,13 +222,27 @@ public:
   }
 
 private:
-  /** The homography that fits best to where corners are found, or, to a few of them, that is shifted best. */
-  static Eigen::Matrix3d improved(const Eigen::Matrix3d& h, const Correspondences& found)
+  /** The homography that fits best to where corners are found, or, to a few of them, that is moved best. */
+  Eigen::Matrix3d improved(const Eigen::Matrix3d& h, const Correspondences& found) const
   {
     constexpr std::size_t ENOUGH = 16;
     if (found.size() >= ENOUGH)
     {
       return refineHomography(h, found, FIT_HUBER_WIDTH);
+    }
+    if (search_.slanted)
+    {
+      Points from;
+      Points to;
+      for (const Correspondence& pair : found)
+      {
+        from.push_back(transfer(h, pair.reference));
+        to.push_back(pair.current);
+      }
+      const std::vector<double> weights(found.size(), 1.0);
+      const auto affinity =
+          plausibleAffinity(from.data(), to.data(), weights.data(), static_cast<int>(found.size()), AffinityLimits());
+      return affinity ? Eigen::Matrix3d(*affinity * h) : h;
     }
     Eigen::Vector2d off = Eigen::Vector2d::Zero();
     for (const Correspondence& pair : found)
@@ -267,6 +291,7 @@ private:
   const cv::Mat& reference_;
   const cv::Mat& current_;
   double nearly_;  ///< see otherPlace()
+  const Search& search_;
   GuidedParams guidance_;
   std::vector<Corner> corners_;        ///< where they are in the reference image
   std::vector<Eigen::Vector2d> here_;  ///< where they are in the current image
@@ -300,11 +325,10 @@ std::vector<Eigen::Vector2d> spread(const Correspondences& matches, const cv::Si
   return chosen;
 }
 
-}  // namespace
-
-std::optional<Eigen::Matrix3d> otherPlace(const cv::Mat& reference, const cv::Mat& current,
-                                          const Correspondences& matches, const std::vector<Corner>& current_corners,
-                                          const Eigen::Matrix3d& h, double nearly)
+std::optional<Eigen::Matrix3d> searchOtherPlace(const cv::Mat& reference, const cv::Mat& current,
+                                                const Correspondences& matches,
+                                                const std::vector<Corner>& current_corners, const Eigen::Matrix3d& h,
+                                                double nearly, const Search& search)
 {
   constexpr std::size_t FEWEST = 20;  // matches that can tell anything
   constexpr std::size_t SITES = 8;    // places from which another is looked for
@@ -313,7 +337,7 @@ std::optional<Eigen::Matrix3d> otherPlace(const cv::Mat& reference, const cv::Ma
     return std::nullopt;
   }
   const Surroundings surroundings(current, current_corners);
-  const Matches tried(reference, current, matches, h, nearly);
+  const Matches tried(reference, current, matches, h, nearly, search);
   for (const Eigen::Vector2d& site : spread(matches, current.size(), SITES))
   {
     for (const Eigen::Vector2d& place : surroundings.like(site))
@@ -326,6 +350,44 @@ std::optional<Eigen::Matrix3d> otherPlace(const cv::Mat& reference, const cv::Ma
     }
   }
   return std::nullopt;
+}
+
+}  // namespace
+
+std::optional<Eigen::Matrix3d> otherPlace(const cv::Mat& reference, const cv::Mat& current,
+                                          const Correspondences& matches, const std::vector<Corner>& current_corners,
+                                          const Eigen::Matrix3d& h, double nearly)
+{
+  const Search search{ { 120.0, 240.0, EVERYWHERE, EVERYWHERE }, false };
+  return searchOtherPlace(reference, current, matches, current_corners, h, nearly, search);
+}
+
+std::optional<Eigen::Vector2d> otherPlaceInPicture(const cv::Mat& grey, const cv::Rect& region)
+{
+  constexpr std::size_t MOST = 500;          // corners of the region
+  constexpr std::size_t MOST_PLACES = 1500;  // in the picture
+  const cv::Rect everywhere({ 0, 0 }, grey.size());
+  const cv::Rect part = region.empty() ? everywhere : region & everywhere;
+  std::vector<Corner> places = detectCorners(grey, CornerParams());
+  Correspondences pairs;
+  for (const Corner& corner : places)  // strongest first
+  {
+    if (pairs.size() < MOST && part.contains(cv::Point(cvRound(corner.position.x()), cvRound(corner.position.y()))))
+    {
+      pairs.push_back({ corner.position, corner.position });
+    }
+  }
+  places.resize(std::min(places.size(), MOST_PLACES));
+  constexpr double NEARLY = 0.85;  // as in otherPlace()
+  const Search search{ { 60.0, 100.0, 160.0, 260.0, EVERYWHERE, EVERYWHERE }, true };
+  const std::optional<Eigen::Matrix3d> other =
+      searchOtherPlace(grey, grey, pairs, places, Eigen::Matrix3d::Identity(), NEARLY, search);
+  if (!other)
+  {
+    return std::nullopt;
+  }
+  const Eigen::Vector2d middle = middleOf(part);
+  return transfer(*other, middle) - middle;
 }
 
 }  // namespace view_servo

@@ -52,6 +52,17 @@ TEST(RegionJudgement, SaysThatARegionIsBlurred)
   EXPECT_TRUE(says(judgement, "focus")) << judgement.text;
 }
 
+TEST(RegionJudgement, SaysWhatIsThereMoreThanOnce)
+{
+  cv::Mat picture = halfTextured();
+  const cv::Rect left(0, 0, 300, 480);
+  picture(left).copyTo(picture(left + cv::Point(320, 0)));
+  const RegionJudgement judgement = judgeRegion(picture, { 20, 20, 240, 300 });
+  EXPECT_FALSE(judgement.is_good) << judgement.text;
+  EXPECT_TRUE(says(judgement, "repeats itself 320 px away")) << judgement.text;
+  EXPECT_TRUE(says(judgement, "only once")) << judgement.text;
+}
+
 TEST(RegionJudgement, TakesAnyRegion)
 {
   const cv::Mat picture = halfTextured();
