@@ -8,10 +8,13 @@
 #include "view_servo/ros/conversions.h"
 #include "view_servo/ros/node_base.h"
 
+#include <cv_bridge/cv_bridge.h>
 #include <image_transport/image_transport.h>
 #include <image_transport/transport_hints.h>
+#include <sensor_msgs/image_encodings.h>
 #include <boost/function.hpp>
 #include <boost/make_shared.hpp>
+#include <opencv2/imgproc.hpp>
 
 #include <algorithm>
 #include <cstdint>
@@ -70,6 +73,28 @@ CameraImage::CameraImage(const sensor_msgs::CompressedImageConstPtr& image, cons
 cv::Mat toGrey(const CameraImage& image)
 {
   return image.packed ? toGrey(*image.packed, image.topic) : toGrey(*image.raw, image.topic);
+}
+
+cv::Mat toColour(const CameraImage& image)
+{
+  namespace encodings = sensor_msgs::image_encodings;
+  cv::Mat colour;
+  if (image.packed)
+  {
+    cv::Mat decoded = decodeImage(std::string(image.packed->data.begin(), image.packed->data.end()), image.topic);
+    if (decoded.type() == CV_8UC3)
+    {
+      return decoded;
+    }
+    cv::cvtColor(toGrey(decoded, image.topic), colour, cv::COLOR_GRAY2BGR);
+    return colour;
+  }
+  if (encodings::isColor(image.raw->encoding) && encodings::bitDepth(image.raw->encoding) == 8)
+  {
+    return cv_bridge::toCvCopy(image.raw, encodings::BGR8)->image;
+  }
+  cv::cvtColor(toGrey(image), colour, cv::COLOR_GRAY2BGR);
+  return colour;
 }
 
 void CameraImageSubscriber::subscribe(const ros::NodeHandle& nh, const ros::NodeHandle& private_nh,

@@ -74,6 +74,7 @@ RobotLight judgeRobot(const RobotSnapshot& robot)
       worst = light.colour > worst.colour ? light : worst;
     }
   }
+  worst.text += robot.followed.empty() ? "" : "; " + robot.followed;
   return worst;
 }
 

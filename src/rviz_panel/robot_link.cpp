@@ -2,6 +2,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "rviz_panel/robot_link.h"
 
+#include "view_servo/FollowRouteAction.h"
 #include "view_servo/GetView.h"
 #include "view_servo/HomeToViewAction.h"
 #include "view_servo/ListViews.h"
@@ -15,13 +16,11 @@
 
 #include <actionlib/client/action_client.h>
 #include <actionlib_msgs/GoalStatusArray.h>
-#include <cv_bridge/cv_bridge.h>
 #include <diagnostic_msgs/DiagnosticArray.h>
 #include <ros/callback_queue.h>
 #include <ros/master.h>
 #include <ros/message_event.h>
 #include <ros/spinner.h>
-#include <sensor_msgs/image_encodings.h>
 #include <std_srvs/SetBool.h>
 #include <opencv2/imgproc.hpp>
 
@@ -44,36 +43,17 @@ constexpr double GATE_PATIENCE = 2.0;    // until a driver has answered [s]
 constexpr double LOOK_PERIOD = 3.0;      // views and topics are looked for [s]
 constexpr double PICTURE_PERIOD = 0.05;  // pictures are decoded at most this often [s]
 constexpr double CURVE_SPAN = 60.0;      // [s]
+constexpr double FOLLOWED_SPAN = 3.0;    // diagnostics of the tracker are believed for so long [s]
 
 struct DriverKind
 {
   std::string name;
   std::string action;
+  bool goes_to_views;  // a goal is a view, not a route
 };
-const std::array<DriverKind, 2> KINDS = { DriverKind{ "homing", "home" }, DriverKind{ "servo_25d", "servo" } };
-
-/** As 8-bit BGR. @throws ImageError or cv_bridge::Exception. */
-cv::Mat toColour(const CameraImage& image)
-{
-  namespace encodings = sensor_msgs::image_encodings;
-  cv::Mat colour;
-  if (image.packed)
-  {
-    cv::Mat decoded = decodeImage(std::string(image.packed->data.begin(), image.packed->data.end()), image.topic);
-    if (decoded.type() == CV_8UC3)
-    {
-      return decoded;
-    }
-    cv::cvtColor(toGrey(decoded, image.topic), colour, cv::COLOR_GRAY2BGR);
-    return colour;
-  }
-  if (encodings::isColor(image.raw->encoding) && encodings::bitDepth(image.raw->encoding) == 8)
-  {
-    return cv_bridge::toCvCopy(image.raw, encodings::BGR8)->image;
-  }
-  cv::cvtColor(toGrey(image), colour, cv::COLOR_GRAY2BGR);
-  return colour;
-}
+const std::array<DriverKind, DRIVERS> KINDS = { DriverKind{ "homing", "home", true },
+                                                DriverKind{ "servo_25d", "servo", true },
+                                                DriverKind{ "route_follower", "follow", false } };
 
 cv::Mat toThumbnail(const sensor_msgs::Image& image, const cv::Rect& region)
 {
@@ -92,13 +72,46 @@ cv::Mat toThumbnail(const sensor_msgs::Image& image, const cv::Rect& region)
   return thumbnail;
 }
 
+/** Of a key; empty where there is none. */
+std::string valueOf(const diagnostic_msgs::DiagnosticStatus& status, const std::string& key)
+{
+  const auto pair = std::find_if(status.values.begin(), status.values.end(),
+                                 [&](const diagnostic_msgs::KeyValue& other) { return other.key == key; });
+  return pair == status.values.end() ? "" : pair->value;
+}
+
+/** What homography_tracker's diagnostics say for people; empty while it tracks nothing. */
+std::string whatIsFollowed(const diagnostic_msgs::DiagnosticStatus& tracking)
+{
+  if (tracking.message != "tracking")
+  {
+    return "";
+  }
+  return "the camera sees view '" + valueOf(tracking, "View") + "' as " +
+         (valueOf(tracking, "Followed as") == "scene" ? "a scene with depth" : "one plane");
+}
+
+std::string& targetOf(HomeToViewGoal& goal)
+{
+  return goal.view;
+}
+std::string& targetOf(ServoToViewGoal& goal)
+{
+  return goal.view;
+}
+std::string& targetOf(FollowRouteGoal& goal)
+{
+  return goal.route;
+}
+
 /** Sends goals of one kind of driver. */
 class DriverClient
 {
 public:
   virtual ~DriverClient() = default;
   virtual bool isThere() const = 0;
-  virtual void go(const std::string& view) = 0;
+  /** @param target a view, or a route, by its name. */
+  virtual void go(const std::string& target) = 0;
   virtual void cancelAll() = 0;
 };
 
@@ -121,10 +134,10 @@ public:
     return client_.isServerConnected();
   }
 
-  void go(const std::string& view) override
+  void go(const std::string& target) override
   {
     typename Action::_action_goal_type::_goal_type goal;
-    goal.view = view;
+    targetOf(goal) = target;
     handle_ = client_.sendGoal(goal, [this](Handle handle) {
       if (handle.getCommState() == actionlib::CommState::DONE)
       {
@@ -182,6 +195,10 @@ public:
       data_.drivers[k].is_there = connections && connections->clients[k]->isThere();
       data_.drivers[k].silence = diagnosed_[k] ? secondsSince(*diagnosed_[k]) : 0.0;
     }
+    if (followed_ && secondsSince(*followed_) > FOLLOWED_SPAN)
+    {
+      data_.followed.clear();
+    }
     while (!data_.errors.empty() && secondsSince(data_.errors.front().time) > CURVE_SPAN)
     {
       data_.errors.pop_front();
@@ -222,13 +239,19 @@ public:
     }
     say(kinds.empty()
             ? "No driver runs" + place() + ": start homing.launch or arm_servo.launch, or name the robot's namespace"
-            : "homing and servo_25d both run" + place() + ": start them in namespaces of their own",
+            : KINDS[kinds[0]].name + " and " + KINDS[kinds[1]].name + " both run" + place() +
+                  ": start them in namespaces of their own",
         false);
     return std::nullopt;
   }
 
   void go(std::size_t kind, const std::string& view)
   {
+    if (!KINDS[kind].goes_to_views)
+    {
+      say(KINDS[kind].name + " follows routes: its goals come by its action " + resolved(KINDS[kind].action), false);
+      return;
+    }
     if (const std::shared_ptr<Connections> connections = this->connections())
     {
       say(KINDS[kind].name + " is asked to drive to '" + view + "'", true);
@@ -273,17 +296,14 @@ public:
         const auto end = [this, k](bool success, const std::string& words) {
           takeEnd(k, success, words);
         };
-        if (k == 0)
-        {
-          connections->clients[k] =
-              std::make_unique<ActionDriver<HomeToViewAction>>(nh, KINDS[k].action, connections->queue, end);
-        }
-        else
-        {
-          connections->clients[k] =
-              std::make_unique<ActionDriver<ServoToViewAction>>(nh, KINDS[k].action, connections->queue, end);
-        }
+        const auto client = [&](auto type) -> std::unique_ptr<DriverClient> {
+          return std::make_unique<ActionDriver<decltype(type)>>(nh, KINDS[k].action, connections->queue, end);
+        };
+        connections->clients[k] = k == 0   ? client(HomeToViewAction())
+                                  : k == 1 ? client(ServoToViewAction())
+                                           : client(FollowRouteAction());
       }
+      tracking_ = resolved("homography_tracker").substr(1) + ": tracking";
       connections->subscribers.push_back(nh.subscribe<diagnostic_msgs::DiagnosticArray>(
           "/diagnostics", 20,
           boost::function<void(const diagnostic_msgs::DiagnosticArrayConstPtr&)>(
@@ -461,7 +481,7 @@ private:
     std::vector<ros::Subscriber> subscribers;
     CameraImageSubscriber camera;
     std::unique_ptr<CameraImageSubscriber> overlay;
-    std::array<std::unique_ptr<DriverClient>, 2> clients;
+    std::array<std::unique_ptr<DriverClient>, DRIVERS> clients;
     ros::AsyncSpinner spinner{ 1, &queue };
   };
 
@@ -521,13 +541,20 @@ private:
   std::string setGate(ServiceCaller& caller, std::size_t kind, std_srvs::SetBool& service,
                       CallOutcome::Kind* kind_of_outcome = nullptr)
   {
-    std::string name = resolved(KINDS[kind].name + "/enable");
+    // It is below the name of the node that serves the action, which may have been given another one. A nodelet's is below
+    // its own name, but its action is its manager's.
+    std::string node;
     {
-      // It is below the name of the node that serves the action, which may have been given another one.
       const std::lock_guard<std::mutex> lock(mutex_);
-      name = nodes_[kind].empty() ? name : nodes_[kind] + "/enable";
+      node = nodes_[kind];
     }
-    const CallOutcome outcome = caller.call(name, service, GATE_PATIENCE);
+    const std::string usual = resolved(KINDS[kind].name + "/enable");
+    const std::string name = node.empty() ? usual : node + "/enable";
+    CallOutcome outcome = caller.call(name, service, GATE_PATIENCE);
+    if (outcome.kind == CallOutcome::NO_SERVICE && name != usual)
+    {
+      outcome = caller.call(usual, service, GATE_PATIENCE);
+    }
     if (kind_of_outcome != nullptr)
     {
       *kind_of_outcome = outcome.kind;
@@ -637,6 +664,11 @@ private:
     const std::lock_guard<std::mutex> lock(mutex_);
     for (const diagnostic_msgs::DiagnosticStatus& status : message.status)
     {
+      if (status.name == tracking_)
+      {
+        followed_ = Clock::now();
+        data_.followed = whatIsFollowed(status);
+      }
       for (std::size_t k = 0; k < KINDS.size(); ++k)
       {
         if (nodes_[k].empty() || status.name != nodes_[k].substr(1) + ": " + KINDS[k].action)
@@ -688,11 +720,13 @@ private:
   const RobotNames names_;
   mutable std::mutex mutex_;
   RobotSnapshot data_;
-  std::array<std::string, 2> nodes_;  // absolute names of those that serve the actions; empty: not known yet
-  std::array<std::optional<Clock::time_point>, 2> diagnosed_;
-  bool overlay_wanted_ = false;    // for the worker
-  std::array<bool, 2> stopped_{};  // somebody has pressed Stop since the last goal was sent
-  std::string changed_;            // a view that was stored and has to be read anew
+  std::array<std::string, DRIVERS> nodes_;  // absolute names of those that serve the actions; empty: not known yet
+  std::array<std::optional<Clock::time_point>, DRIVERS> diagnosed_;
+  std::string tracking_;                       // name of the tracker's diagnostics; set before any come
+  std::optional<Clock::time_point> followed_;  // when the tracker has said what it sees
+  bool overlay_wanted_ = false;                // for the worker
+  std::array<bool, DRIVERS> stopped_{};        // somebody has pressed Stop since the last goal was sent
+  std::string changed_;                        // a view that was stored and has to be read anew
   std::shared_ptr<Connections> connections_;
 };
 

@@ -50,7 +50,7 @@ private:
   TaskWorker::Task task(Body body) const;
   std::shared_ptr<Core> core_;
   TaskWorker views_;                                 // view_store and the master
-  std::array<TaskWorker, 2> gates_;                  // one a driver, so that one that hangs does not hold up the other
+  std::array<TaskWorker, DRIVERS> gates_;            // one a driver, so that one that hangs does not hold up the others
   std::chrono::steady_clock::time_point next_look_;  // when the views are listed again
 };
 

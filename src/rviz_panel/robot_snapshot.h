@@ -8,6 +8,7 @@
 
 #include <array>
 #include <chrono>
+#include <cstddef>
 #include <deque>
 #include <optional>
 #include <string>
@@ -44,10 +45,13 @@ struct TopicPicture
   unsigned count = 0;                           ///< number of pictures so far
 };
 
+/** Number of kinds of drivers. */
+constexpr std::size_t DRIVERS = 3;
+
 /** What is known of a driver. */
 struct DriverState
 {
-  std::string kind;                   ///< "homing" or "servo_25d"
+  std::string kind;                   ///< "homing", "servo_25d" or "route_follower"
   bool is_there = false;              ///< whether its action is served
   std::optional<ServoStatus> status;  ///< the last one
   std::optional<bool> enabled;        ///< whether its gate is open; empty: not known
@@ -76,8 +80,9 @@ struct Words
 /** All that a RobotLink knows. Pictures share their data, which nobody changes. */
 struct RobotSnapshot
 {
-  std::array<DriverState, 2> drivers;  ///< homing, servo_25d
-  std::deque<ErrorSample> errors;      ///< of the last minute, oldest first
+  std::array<DriverState, DRIVERS> drivers;  ///< homing, servo_25d, route_follower
+  std::string followed;                      ///< what homography_tracker sees now, for people; empty: nothing
+  std::deque<ErrorSample> errors;            ///< of the last minute, oldest first
   std::vector<ListedView> views;
   std::string views_fault;                ///< why they cannot be listed; or empty
   unsigned views_count = 0;               ///< how often `views` has changed so far

@@ -31,7 +31,8 @@ import PIL.Image  # noqa: E402
 import rospy  # noqa: E402
 from geometry_msgs.msg import PoseStamped  # noqa: E402
 from std_srvs.srv import SetBool, SetBoolResponse  # noqa: E402
-from view_servo.msg import HomeToViewAction, HomeToViewResult, ServoStatus, ServoToViewAction, ServoToViewResult  # noqa: E402
+from view_servo.msg import (FollowRouteAction, FollowRouteResult, HomeToViewAction, HomeToViewResult, ServoStatus,  # noqa: E402
+                            ServoToViewAction, ServoToViewResult)
 
 sys.dont_write_bytecode = True
 loader = importlib.machinery.SourceFileLoader("view", os.path.join(ROOT, "scripts", "view"))
@@ -102,6 +103,7 @@ class ViewCommands(graph.GraphTest):
         # One goes by the names that launch files give, the other's service by its node's.
         cls.homing = Driver("home", HomeToViewAction, HomeToViewResult, "homing/enable")
         cls.arm = Driver("arm1/servo", ServoToViewAction, ServoToViewResult, node + "/enable")
+        cls.follower = Driver("follow", FollowRouteAction, FollowRouteResult, "route_follower/enable")
         cls.hanging, cls.dead = Peer(), Peer(closed=True)
         for peer, space in ((cls.hanging, "/hanging"), (cls.dead, "/dead")):
             for service in ("view_store/list", "homing/enable"):
@@ -123,7 +125,7 @@ class ViewCommands(graph.GraphTest):
         cls.pose = message.pose.position
 
     def setUp(self):
-        for driver in (self.homing, self.arm):
+        for driver in (self.homing, self.arm, self.follower):
             driver.behaviour, driver.enabled = "arrive", None
             driver.goals.clear()
             driver.came.clear()
@@ -291,6 +293,15 @@ class ViewCommands(graph.GraphTest):
         for tracker in self.homing.server.status_list:
             tracker.status.status = 4
 
+    def test_waits_for_the_nodes_timeout(self):
+        """It is a parameter below the name that the services are below, as a nodelet's actions are its manager's."""
+        rospy.set_param("/homing/timeout", 0.5)
+        self.homing.behaviour = "deaf"
+        try:
+            self.view("go dock", NOT_DONE, "has not ended the goal within its timeout of 0.5 s")
+        finally:
+            rospy.delete_param("/homing/timeout")
+
     def test_go_to_several_views(self):
         out = self.view("go above shelf --approach 0.01 0.05 servo:=arm1/servo --driver servo_25d")
         self.assertIn("to drive to 'above', then 'shelf'; Ctrl-C stops it", out)
@@ -311,8 +322,8 @@ class ViewCommands(graph.GraphTest):
         for driver in (self.homing, self.arm):
             self.assertTrue(driver.came.wait(PATIENCE))
         out = self.view("stop servo:=arm1/servo")
-        self.assertEqual(out.count("disabled; no goal is left"), 2, out)
-        self.assertEqual((self.homing.enabled, self.arm.enabled), (False, False))
+        self.assertEqual(out.count("disabled; no goal is left"), 3, out)
+        self.assertEqual((self.homing.enabled, self.arm.enabled, self.follower.enabled), (False, False, False))
         for process in runs:
             self.end(process, NOT_DONE, "not arrived: the goal was cancelled")
         for space, cause in (("/hanging", "does not answer within"), ("/dead", "cannot be called")):

@@ -13,6 +13,7 @@
 #include "view_servo/views/view_store.h"
 
 #include <geometry_msgs/Twist.h>
+#include <geometry_msgs/TwistStamped.h>
 #include <gtest/gtest.h>
 #include <ros/callback_queue.h>
 #include <ros/spinner.h>
@@ -99,6 +100,35 @@ protected:
     QApplication::sendEvent(&widget, &event);
   }
 
+  /** Drags over a part of the picture, from its middle to both sides, once it is shown. */
+  void drag(const sensor_msgs::Image& image, double part_of_width, double part_of_height)
+  {
+    auto& picture = find<QWidget>("picture");
+    // A cursor for dragging is there.
+    ASSERT_TRUE(waitForWidget([&] { return picture.cursor().shape() == Qt::CrossCursor; }));
+    const double scale = std::min(picture.width() / static_cast<double>(image.width),
+                                  picture.height() / static_cast<double>(image.height));
+    const QPointF middle(0.5 * picture.width(), 0.5 * picture.height());
+    const QPointF half(0.5 * part_of_width * scale * image.width, 0.5 * part_of_height * scale * image.height);
+    mouse(picture, QEvent::MouseButtonPress, middle - half);
+    mouse(picture, QEvent::MouseMove, middle);
+    mouse(picture, QEvent::MouseButtonRelease, middle + half);
+    EXPECT_NE(text("region").find(" corners"), std::string::npos) << text("region");
+  }
+
+  /** Stores what was dragged, and selects it. */
+  void store(const char* name)
+  {
+    auto& views = find<QListWidget>("views");
+    find<QLineEdit>("name").setText(name);
+    ASSERT_TRUE(waitForWidget([&] { return find<QPushButton>("store").isEnabled(); }));
+    press("store");
+    ASSERT_TRUE(waitForWidget([&] { return views.count() == 1; })) << text("words");
+    EXPECT_EQ(views.item(0)->text().toStdString().rfind(name, 0), 0U);
+    views.setCurrentRow(0);
+    ASSERT_TRUE(waitForWidget([&] { return find<QPushButton>("go").isEnabled(); }));
+  }
+
   std::unique_ptr<ViewsWidget> widget_ = std::make_unique<ViewsWidget>();
   double longest_ = 0.0;  // [s]
 };
@@ -112,29 +142,14 @@ TEST_F(ViewsPanelTest, StoresADraggedRegionDrivesAndStops)
   ASSERT_TRUE(waitForService("homing/enable"));
   ASSERT_TRUE(waitUntil([&] { return images.last().has_value(); }));
   show("");
-  auto& picture = find<QWidget>("picture");
-  auto& views = find<QListWidget>("views");
   // The words tell that nothing is missing, and the light that the driver is there.
   ASSERT_TRUE(waitForText("state", "homing: disabled")) << text("state");
-  ASSERT_EQ(views.count(), 0);
+  ASSERT_EQ(find<QListWidget>("views").count(), 0);
 
-  // The middle of the picture, once it is shown: a cursor for dragging is there.
-  ASSERT_TRUE(waitForWidget([&] { return picture.cursor().shape() == Qt::CrossCursor; }));
   const double width = images.last()->width;
   const double height = images.last()->height;
-  const double scale = std::min(picture.width() / width, picture.height() / height);
-  const QPointF middle(0.5 * picture.width(), 0.5 * picture.height());
-  const QPointF half(0.25 * scale * width, 0.3 * scale * height);
-  mouse(picture, QEvent::MouseButtonPress, middle - half);
-  mouse(picture, QEvent::MouseMove, middle);
-  mouse(picture, QEvent::MouseButtonRelease, middle + half);
-  EXPECT_NE(text("region").find(" corners"), std::string::npos) << text("region");
-
-  find<QLineEdit>("name").setText("dragged");
-  ASSERT_TRUE(waitForWidget([&] { return find<QPushButton>("store").isEnabled(); }));
-  press("store");
-  ASSERT_TRUE(waitForWidget([&] { return views.count() == 1; })) << text("words");
-  EXPECT_EQ(views.item(0)->text().toStdString().rfind("dragged", 0), 0U);
+  drag(*images.last(), 0.5, 0.6);
+  store("dragged");
   const cv::Rect region = ViewStore(viewsDir("view_store")).load("dragged").region;
   EXPECT_NEAR(region.x, 0.25 * width, 3.0);
   EXPECT_NEAR(region.y, 0.2 * height, 3.0);
@@ -150,8 +165,6 @@ TEST_F(ViewsPanelTest, StoresADraggedRegionDrivesAndStops)
   away.request.pose.position.y = 0.3;
   away.request.pose.orientation.w = 1.0;
   ASSERT_TRUE(callService("nomad_sim/set_pose", away) && away.response.success) << away.response.message;
-  views.setCurrentRow(0);
-  ASSERT_TRUE(waitForWidget([&] { return find<QPushButton>("go").isEnabled(); }));
   press("go");
   EXPECT_TRUE(waitForText("words", "press Enable, then Go")) << text("words");
   press("enable");
@@ -176,6 +189,53 @@ TEST_F(ViewsPanelTest, StoresADraggedRegionDrivesAndStops)
   EXPECT_TRUE(waitForText("state", "homing: disabled")) << text("state");
   EXPECT_LT(longest_, 0.5 * SLOWDOWN);
   removeViews("view_store");
+}
+
+TEST_F(ViewsPanelTest, DrivesAnArmToItsViewAndStopsIt)
+{
+  Recorder<geometry_msgs::TwistStamped> commands("arm/cmd_vel");
+  Recorder<sensor_msgs::Image> images("arm/camera/image_raw");
+  ASSERT_TRUE(waitForService("arm/view_store/save"));
+  ASSERT_TRUE(waitForService("arm/servo_25d/enable"));
+  ASSERT_TRUE(waitUntil([&] { return images.last().has_value(); }));
+  const auto is_moving = [&] {
+    return commands.last() && std::abs(commands.last()->twist.linear.x) + std::abs(commands.last()->twist.linear.y) +
+                                      std::abs(commands.last()->twist.linear.z) >
+                                  0.005;
+  };
+  show("arm");
+  ASSERT_TRUE(waitForText("state", "servo_25d: disabled")) << text("state");
+  drag(*images.last(), 0.44, 0.85);
+  store("shelf");
+  press("enable");
+  ASSERT_TRUE(waitForText("words", "servo_25d is enabled")) << text("words");
+
+  SetPose away;
+  away.request.pose.position.x = 0.42;
+  away.request.pose.position.y = 0.06;
+  away.request.pose.position.z = 0.77;
+  away.request.pose.orientation.x = away.request.pose.orientation.z = -0.5;  // along the world's x axis, upright
+  away.request.pose.orientation.y = away.request.pose.orientation.w = 0.5;
+  ASSERT_TRUE(callService("arm/puma_sim/set_pose", away) && away.response.success) << away.response.message;
+  press("go");
+  EXPECT_TRUE(waitForWidget(is_moving)) << text("state") << ", " << text("words");
+  EXPECT_TRUE(waitForText("state", "the camera sees view 'shelf' as one plane")) << text("state");
+  EXPECT_TRUE(waitForText("words", "Arrived: ")) << text("words");
+  EXPECT_TRUE(waitForText("state", "servo_25d: arrived")) << text("state");
+
+  ASSERT_TRUE(callService("arm/puma_sim/set_pose", away) && away.response.success) << away.response.message;
+  press("go");
+  ASSERT_TRUE(waitForWidget(is_moving)) << text("state") << ", " << text("words");
+  press("stop");
+  EXPECT_TRUE(waitForText("words", "Stop: servo_25d is disabled")) << text("words");
+  EXPECT_TRUE(waitForWidget([&] {
+    const geometry_msgs::Twist last = commands.last()->twist;
+    return last.linear.x == 0.0 && last.linear.y == 0.0 && last.linear.z == 0.0 && last.angular.x == 0.0 &&
+           last.angular.y == 0.0 && last.angular.z == 0.0;
+  }));
+  EXPECT_TRUE(waitForText("state", "servo_25d: disabled")) << text("state");
+  EXPECT_LT(longest_, 0.5 * SLOWDOWN);
+  removeViews("arm/view_store");
 }
 
 TEST_F(ViewsPanelTest, SaysThatNothingIsThere)
@@ -255,6 +315,8 @@ TEST(RobotLight, TellsTheWorstOfTheDriversThatAreThere)
   driver.silence = 5.0;
   EXPECT_EQ(judgeRobot(robot).colour, RobotLight::RED);
   EXPECT_EQ(judgeRobot(robot).text, "homing: silent for 5 s");
+  robot.followed = "the camera sees view 'dock' as one plane";
+  EXPECT_EQ(judgeRobot(robot).text, "homing: silent for 5 s; the camera sees view 'dock' as one plane");
 }
 
 }  // namespace

@@ -227,7 +227,7 @@ class Completion(unittest.TestCase):
             known = set(re.findall(r"--[a-z]+", parse(command, "--help")[1].split("    rosrun view_servo")[0]))
             self.assertEqual(set(self.complete("view_servo", "view", command, "-")), known)
         self.assertEqual(self.complete("view_servo", "view", "go", "dock", "--driver", ""),
-                         [kind.name for kind in view.DRIVER_KINDS])
+                         [kind.name for kind in view.DRIVER_KINDS if kind.goes_to_views])
 
     def test_views(self):
         for words in (["go"], ["go", "dock"], ["go", "--approach", "0.01", "0.03", "dock"], ["show"], ["delete"],

@@ -43,6 +43,9 @@ using CameraImageConstPtr = boost::shared_ptr<const CameraImage>;
  */
 cv::Mat toGrey(const CameraImage& image);
 
+/** As 8-bit BGR, for people. @throws ImageError or cv_bridge::Exception. */
+cv::Mat toColour(const CameraImage& image);
+
 /**
  * Subscribes to a camera's images. The transports are those that image_transport has installed; without a plugin for
  * "compressed", sensor_msgs/CompressedImage on TOPIC/compressed is subscribed here, and left as it is until it is used.
