@@ -105,6 +105,13 @@ Finding judgeCalibration(const CameraObservations& camera)
   {
     return error(name, camera.calibration_fault, "calibrate the camera at this size (camera_calibration)");
   }
+  const std::string& topic = camera.images.topic;
+  if (camera.has_distortion && topic.find("rect", topic.rfind('/') + 1) != std::string::npos)
+  {
+    return error(name,
+                 "'" + topic + "' seems to be rectified, but camera_info has distortion, which would be removed again",
+                 "use the raw images, by image:=image_raw, or a camera_info with D of zeros and K of rectified images");
+  }
   const double angle = 2.0 * std::atan(0.5 * camera.width / camera.focal_length) * 180.0 / M_PI;
   const std::string found = (camera.model.empty() ? "pinhole" : camera.model) + ", focal length " +
                             number(camera.focal_length, 0) + " px, " + number(angle, 0) + " degrees wide";

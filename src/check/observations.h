@@ -51,6 +51,7 @@ struct CameraObservations
   std::string age_fault;                   ///< of the newest image
   std::string model;                       ///< of the lens
   double focal_length = UNKNOWN;           ///< [px]
+  bool has_distortion = false;             ///< whether the lens is no pinhole
   std::optional<PictureMeasures> picture;  ///< of the newest image; empty: none can be read
 };
 

@@ -51,7 +51,7 @@ double steadySeconds()
 }
 
 CameraListener::CameraListener(const ros::NodeHandle& nh, const Setup& setup)
-  : topics_{ nh.resolveName(setup.camera + "/image_raw"), nh.resolveName(setup.camera + "/camera_info") },
+  : topics_{ nh.resolveName(setup.camera + "/" + setup.image), nh.resolveName(setup.camera + "/camera_info") },
     input_("image", "'" + topics_.image + "'", INPUT_TIMEOUT),
     last_time_(-std::numeric_limits<double>::infinity())
 {
@@ -129,7 +129,9 @@ CameraObservations CameraListener::observations(const RosGraph& graph, double du
   {
     camera.calibration_fault = faultOf(*frame_->image, *frame_->info, topics_);
     camera.model = frame_->info->distortion_model;
-    camera.focal_length = toCamera(*frame_->info).k(0, 0);
+    const Camera calibration = toCamera(*frame_->info);
+    camera.focal_length = calibration.k(0, 0);
+    camera.has_distortion = calibration.fault().empty() && !calibration.isPinhole();
   }
   try
   {

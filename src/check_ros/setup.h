@@ -11,11 +11,13 @@ struct Setup
 {
   bool is_arm = false;  // arguments are those of arm_servo.launch
   std::string camera = "camera";
+  std::string image = "image_raw";
   std::string image_transport = "raw";
   std::string odom = "odom";                  // of a base
   std::string joint_states = "joint_states";  // of an arm
   std::string cmd_vel = "cmd_vel";
   std::string base_frame = "base_link";  // of a base
+  bool slides = true;                    // of a base: it is holonomic
   std::string odom_frame = "base_link";  // of an arm, the frame that it stands in; empty: do without tf
   std::string frame_prefix;              // put before frames of simulated robots
   std::string views_dir;

@@ -52,19 +52,27 @@ std::vector<TestDrive::Part> TestDrive::parts() const
              { "down", "up", along(Y, d) },
              { "roll", "roll back", along(ABOUT_Z, a) } };
   }
-  return { { "forward", "back", along(X, d) },
-           { "left", "right", along(Y, d) },
-           { "turn left", "turn right", along(ABOUT_Z, a) } };
+  std::vector<Part> parts = { { "forward", "back", along(X, d) } };
+  if (robot_.setup().slides)
+  {
+    parts.push_back({ "left", "right", along(Y, d) });
+  }
+  parts.push_back({ "turn left", "turn right", along(ABOUT_Z, a) });
+  return parts;
 }
 
 std::string TestDrive::plan() const
 {
   const std::string far = number(100.0 * params_.distance, 0) + " cm";
   const std::string turn = number(params_.angle / DEGREE, 0) + " degrees";
-  return robot_.setup().is_arm ? "the camera moves " + far + " to its right and back, " + far +
-                                     " down and back, and rolls by " + turn + " and back"
-                               : "the base drives " + far + " ahead and back, " + far +
-                                     " to the left and back, and turns by " + turn + " to the left and back";
+  if (robot_.setup().is_arm)
+  {
+    return "the camera moves " + far + " to its right and back, " + far + " down and back, and rolls by " + turn +
+           " and back";
+  }
+  return "the base drives " + far + " ahead and back, " +
+         (robot_.setup().slides ? far + " to the left and back, " : "") + "and turns by " + turn +
+         " to the left and back";
 }
 
 std::string TestDrive::refusal(const Findings& findings, bool by_hand) const

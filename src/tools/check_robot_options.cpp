@@ -22,21 +22,24 @@ const char* const USAGE =
     "  rosrun view_servo check_robot [homing|arm_servo] [OPTIONS] [NAME:=VALUE...]\n"
     "\n"
     "NAME:=VALUE are arguments of homing.launch or arm_servo.launch, so the same words can be typed for both:\n"
-    "  camera:= image_transport:= cmd_vel:= views_dir:= dry_run:= frame_prefix:=\n"
-    "  and odom:= base_frame:= of a base, joint_states:= odom_frame:= of an arm.";
+    "  camera:= image:= image_transport:= cmd_vel:= views_dir:= dry_run:= frame_prefix:=\n"
+    "  and odom:= base_frame:= base:= of a base, joint_states:= odom_frame:= of an arm.";
 
 /** Arguments that both launch files have, or one of them, and that say nothing about how the robot is wired. */
 const std::vector<std::string> PASSED_OVER = { "sim",
                                                "bag",
+                                               "play_options",
                                                "view",
                                                "world",
                                                "start",
                                                "groups",
+                                               "approach",
                                                "exit",
                                                "patience",
                                                "result",
                                                "config",
                                                "mode",
+                                               "target",
                                                "tracker_config",
                                                "matching",
                                                "max_speed",
@@ -47,15 +50,24 @@ const std::vector<std::string> PASSED_OVER = { "sim",
                                                "rviz",
                                                "image_noise",
                                                "record",
+                                               "report",
+                                               "nodelets",
+                                               "manager",
+                                               "mount",
+                                               "fixed_frame",
+                                               "hand_eye",
+                                               "hand_eye_inverse",
                                                "odometry_drift",
                                                "focal_length_error",
                                                "encoder_noise",
                                                "hand_eye_translation_error",
-                                               "hand_eye_rotation_error" };
+                                               "hand_eye_rotation_error",
+                                               "sim_config" };
 
 std::map<std::string, std::string*> textArguments(Setup& setup)
 {
   std::map<std::string, std::string*> arguments = { { "camera", &setup.camera },
+                                                    { "image", &setup.image },
                                                     { "image_transport", &setup.image_transport },
                                                     { "cmd_vel", &setup.cmd_vel },
                                                     { "frame_prefix", &setup.frame_prefix },
@@ -88,6 +100,14 @@ void setArgument(Setup& setup, const std::string& name, const std::string& value
       throw std::runtime_error("dry_run:= is true or false, not '" + value + "'");
     }
     setup.dry_run = value == "true";
+  }
+  else if (name == "base" && !setup.is_arm)
+  {
+    if (value != "holonomic" && value != "differential")
+    {
+      throw std::runtime_error("base:= is holonomic or differential, not '" + value + "'");
+    }
+    setup.slides = value == "holonomic";
   }
   else if (std::find(PASSED_OVER.begin(), PASSED_OVER.end(), name) == PASSED_OVER.end())
   {
@@ -158,6 +178,10 @@ std::optional<CheckOptions> readCheckOptions(int argc, char** argv)
   {
     const std::size_t split = argument.find(":=");
     setArgument(options.setup, argument.substr(0, split), argument.substr(split + 2));
+  }
+  if (std::find(words.arguments.begin(), words.arguments.end(), "sim:=false") != words.arguments.end())
+  {
+    options.setup.frame_prefix.clear();  // the launch files put it before simulated frames only
   }
   options.drive.angle = degrees * M_PI / 180.0;
   return options;

@@ -7,12 +7,13 @@
 #include "view_servo/parameters/error_text.h"
 #include "view_servo/parameters/seconds_since.h"
 #include "view_servo/ros/call_service.h"
+#include "view_servo/ros/camera_image.h"
 #include "view_servo/ros/conversions.h"
+#include "view_servo/ros/node_base.h"
 #include "view_servo/ros/readiness.h"
 
-#include <cv_bridge/cv_bridge.h>
-#include <image_transport/image_transport.h>
 #include <ros/init.h>
+#include <ros/names.h>
 #include <ros/node_handle.h>
 #include <ros/service.h>
 #include <ros/spinner.h>
@@ -96,13 +97,25 @@ bool canOpenWindow()
   return ended == child && WIFEXITED(status) && WEXITSTATUS(status) == 0;
 }
 
-/** The newest image of a topic. */
+/** A word of the command line that is meant as an argument of a launch file is, NAME:=VALUE; else the default. */
+std::string argument(const std::string& name, const std::string& otherwise)
+{
+  const ros::M_string& words = ros::names::getUnresolvedRemappings();
+  const auto word = words.find(name);
+  return word == words.end() ? otherwise : word->second;
+}
+
+/** The newest image of a camera. */
 class LiveImage
 {
 public:
-  explicit LiveImage(const std::string& topic)
-    : transport_(ros::NodeHandle()), subscriber_(transport_.subscribe(topic, 1, &LiveImage::onImage, this))
+  LiveImage()
   {
+    const std::string topic = ros::names::resolve("camera") + "/" + argument("image", "image_raw");
+    subscriber_.registerCallback([this](const CameraImageConstPtr& image) {
+      guarded("an image on '" + image->topic + "'", [&] { onImage(*image); });
+    });
+    subscriber_.subscribe(ros::NodeHandle(), ros::NodeHandle("~"), topic, argument("image_transport", "raw"), 1);
   }
 
   std::string topic() const
@@ -125,13 +138,13 @@ public:
   }
 
 private:
-  void onImage(const sensor_msgs::ImageConstPtr& message)
+  void onImage(const CameraImage& image)
   {
     cv::Mat picture;
     std::string problem;
     try
     {
-      picture = cv_bridge::toCvCopy(message, sensor_msgs::image_encodings::BGR8)->image;
+      picture = toColour(image);
     }
     catch (const std::exception& error)
     {
@@ -150,8 +163,7 @@ private:
   cv::Mat picture_;
   Clock::time_point time_ = Clock::now();
   std::string problem_;
-  image_transport::ImageTransport transport_;
-  image_transport::Subscriber subscriber_;
+  CameraImageSubscriber subscriber_;
 };
 
 /** Calls view_store/save in a thread that is left behind when it hangs. */
@@ -395,7 +407,7 @@ private:
 int run(const std::string& view, bool overwrite)
 {
   requireMaster();
-  const LiveImage camera(ros::names::resolve("camera") + "/image_raw");
+  const LiveImage camera;
   ros::AsyncSpinner spinner(1);
   spinner.start();
   const std::string missing = waitUntilReady(IMAGE_PATIENCE, [&]() -> std::string {
@@ -406,7 +418,7 @@ int run(const std::string& view, bool overwrite)
     const std::string problem = camera.problem();
     return (problem.empty() ? "no image has come on '" + camera.topic() + "'"
                             : "images on '" + camera.topic() + "' cannot be shown: " + problem) +
-           "; camera:=NAMESPACE names another camera";
+           "; camera:=NAMESPACE, image:=NAME and image_transport:=compressed say otherwise";
   });
   if (!ros::ok())
   {
@@ -432,7 +444,7 @@ int main(int argc, char** argv)
     CommandLine line(
         "Shows what the camera sees, and stores it as a view with a region that is dragged with the mouse.\n"
         "\n"
-        "  rosrun view_servo pick_view NAME [OPTIONS] [camera:=NAMESPACE]",
+        "  rosrun view_servo pick_view NAME [OPTIONS] [camera:=NAMESPACE] [image:=NAME] [image_transport:=NAME]",
         "Example: rosrun view_servo pick_view shelf --overwrite camera:=/camera\n"
         "Exit status: 0 stored, 1 not stored, 2 cannot, with one line on standard error.");
     line.flag("overwrite", overwrite, "replace a view of that name");

@@ -9,6 +9,7 @@ messages by a relay in this process.
 import collections
 import json
 import os
+import re
 import signal
 import subprocess
 import sys
@@ -406,9 +407,16 @@ class CheckRobot(graph.GraphTest):
         self.assertEqual(listening.returncode, 130)
 
     def test_7_bad_input(self):
-        for arguments, words in ((["--what"], "--what"), (["odm:=/odom"], "homing.launch has no argument 'odm'"),
+        cases = []
+        for launch_file in ("homing", "arm_servo"):  # what may be given to these may be given to this program
+            with open(os.path.join(ROOT, "launch", launch_file + ".launch"), encoding="utf-8") as file:
+                names = re.findall(r'<arg name="(\w+)" default=', file.read())
+            values = {"dry_run": "true", "base": "differential"}
+            cases.append(([launch_file] + [name + ":=" + values.get(name, "x") for name in names] + ["further:=x"],
+                          launch_file + ".launch has no argument 'further'"))
+        for arguments, words in (*cases, (["--what"], "--what"), (["odm:=/odom"], "homing.launch has no argument 'odm'"),
                                  (["joint_states:=/j"], "no argument 'joint_states'"), (["--seconds", "0"], "--seconds"),
-                                 (["dry_run:=perhaps"], "dry_run"), (["--distance", "5", "--move"], "--distance")):
+                                 (["base:=square"], "holonomic or differential"), (["dry_run:=perhaps"], "dry_run"), (["--distance", "5", "--move"], "--distance")):
             process = self.begin("bad", *arguments)
             text, errors = process.communicate(timeout=PATIENCE)
             self.assertEqual((process.returncode, text), (2, ""))
