@@ -18,14 +18,14 @@ MountMotion motionOf(const Problem& problem, const std::vector<HandEyePose>& pos
   MountMotion result;
   result.poses = motion.poses;
   result.travel = motion.travel;
-  constexpr MountParams DEFAULTS;
+  constexpr double ALIKE = 0.17;  // turned [rad]
   for (std::size_t i = 0; i < poses.size(); ++i)
   {
     for (std::size_t k = i + 1; k < poses.size(); ++k)
     {
       const PlanarPose way = compose(inverse(toPlanar(poses[i].flange_in_base)), toPlanar(poses[k].flange_in_base));
       result.turn = std::max(result.turn, std::abs(way.yaw));
-      if (std::abs(way.yaw) <= DEFAULTS.alike)
+      if (std::abs(way.yaw) <= ALIKE)
       {
         result.way = std::max(result.way, way.distance());
       }

@@ -2,10 +2,13 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "tools/calibration_files.h"
 
+#include "view_servo/parameters/error_text.h"
+
 #include <Eigen/Geometry>
 
 #include <cstdio>
 #include <ctime>
+#include <exception>
 #include <iostream>
 
 namespace view_servo
@@ -44,11 +47,19 @@ HandEyePosesFile posesOf(const HandEyeSession& session, const HandEyeSources& so
 
 void keepPoses(HandEyePosesFile poses, const std::string& path, const std::string& program)
 {
-  if (!path.empty())
+  if (path.empty())
+  {
+    return;
+  }
+  try
   {
     poses.comment = program + ", " + dateAndTime() + ": poses for its option --file";
     writeHandEyePosesFile(poses, path);
     std::cout << poses.poses.size() << " poses are kept in " << path << std::endl;
+  }
+  catch (const std::exception& error)
+  {
+    std::cerr << program << ": the poses are not kept: " << oneLine(error) << std::endl;
   }
 }
 

@@ -24,8 +24,8 @@ std::string dateAndTime();
 HandEyePosesFile posesOf(const HandEyeSession& session, const HandEyeSources& sources);
 
 /**
- * Writes poses for the option --file of a program, and says so. @param path of the file; empty: nothing is written.
- * @throws std::runtime_error when it cannot be written.
+ * Writes poses for the option --file of a program, and says so, or why it cannot: what they are for goes on without.
+ * @param path of the file; empty: nothing is written.
  */
 void keepPoses(HandEyePosesFile poses, const std::string& path, const std::string& program);
 

@@ -4,6 +4,8 @@
 
 #include "tools/ros_program.h"
 
+#include <unistd.h>
+
 #include <filesystem>
 #include <stdexcept>
 
@@ -17,6 +19,25 @@ void refuseToReplace(const std::string& path, const std::string& option, bool ov
   if (!overwrite && !path.empty() && std::filesystem::exists(path))
   {
     throw std::runtime_error("'" + path + "' exists: say --overwrite, or another file by " + option);
+  }
+}
+
+/** So that nobody learns after sixteen poses that nothing can be kept. */
+void requireWritable(const std::string& path, const std::string& option)
+{
+  if (path.empty())
+  {
+    return;
+  }
+  const std::filesystem::path parent = std::filesystem::path(path).parent_path();
+  const std::string directory = parent.empty() ? "." : parent.string();
+  if (!std::filesystem::is_directory(directory))
+  {
+    throw std::runtime_error(option + ": there is no directory '" + directory + "': make it first");
+  }
+  if (access(directory.c_str(), W_OK) != 0)
+  {
+    throw std::runtime_error(option + ": '" + directory + "' cannot be written to");
   }
 }
 
@@ -74,6 +95,8 @@ bool readCalibrationOptions(CommandLine& line, int argc, char** argv, const Cali
   }
   refuseToReplace(options.out, "--out", options.overwrite);
   refuseToReplace(options.keep, "--keep", options.overwrite);
+  requireWritable(options.out, "--out");
+  requireWritable(options.keep, "--keep");
   return true;
 }
 

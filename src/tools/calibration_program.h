@@ -44,7 +44,7 @@ int usedOf(const Result& result)
 }
 
 /**
- * Says what came of a calibration, and writes its file.
+ * Says what came of a calibration, and then writes its file.
  * @param poses that it was computed from.
  * @return CALIBRATED or NOT_CALIBRATED. @throws std::runtime_error when the file cannot be written.
  */
@@ -74,14 +74,14 @@ CalibrationStatus finish(const Calibration& calibration, const HandEyePosesFile&
   file.covariance = numbersOf(result.covariance);
   file.comment = std::string(Calibration::NAME) + ", " + dateAndTime() + ": view " + poses.view_name + ", " + share;
   const std::string& out = calibration.options.out;
-  writeHandEyeFile(file, out);
-
   const std::string numbers = numbersOf(camera);
   std::cout << "errors: " << Calibration::describeErrors(result) << " (standard deviation "
             << fixed({ 1e3 * result.distance_sigma }, 1) << " mm)\n"
             << "'" << file.camera_frame << "' in '" << file.flange_frame << "' by " << share
             << ": x y z qx qy qz qw = " << numbers << '\n'
-            << calibration.describePose(result) << "written to " << out << "; to publish it, one of\n"
+            << calibration.describePose(result) << std::flush;
+  writeHandEyeFile(file, out);
+  std::cout << "written to " << out << "; to publish it, one of\n"
             << "  roslaunch view_servo " << Calibration::LAUNCH_ARGUMENTS << out << '\n'
             << "  rosrun tf2_ros static_transform_publisher " << numbers << ' ' << file.flange_frame << ' '
             << file.camera_frame << std::endl;
@@ -172,12 +172,25 @@ CalibrationStatus calibrateAtRobot(Calibration& calibration)
   calibration.prepare(session);
   std::cout << "view '" << options.sources.view << "': " << calibration.task() << "; Ctrl-C ends it with what there is"
             << std::endl;
-  const typename Calibration::Result result = collectPoses(calibration, session);
+  typename Calibration::Result result;
+  std::exception_ptr fault;
+  try
+  {
+    result = collectPoses(calibration, session);
+  }
+  catch (const std::exception&)
+  {
+    fault = std::current_exception();  // what has been taken is kept all the same
+  }
   HandEyePosesFile poses = posesOf(session, options.sources);
   poses.camera_height = calibration.cameraHeight();
   if (!poses.poses.empty())
   {
     keepPoses(poses, options.keep, Calibration::NAME);
+  }
+  if (fault)
+  {
+    std::rethrow_exception(fault);
   }
   return finish(calibration, poses, result);
 }

@@ -27,8 +27,7 @@ struct MountParams
 {
   int min_poses = 8;        ///< least number of poses that differ from one another, >= 6
   double min_turn = 0.35;   ///< least angle between two poses [rad]
-  double min_way = 0.2;     ///< least distance between two poses that are turned alike [m]
-  double alike = 0.17;      ///< angle up to which two poses are turned alike [rad]
+  double min_way = 0.2;     ///< least distance between two poses that are turned alike, to 0.17 rad [m]
   double min_travel = 0.1;  ///< least way of the camera between two poses, as a part of the plane's distance
   /** Standard deviation of a way, along and across it, as a part of it: a first guess, the data tell it better. */
   double way_noise = 0.02;
