@@ -91,8 +91,9 @@ std::optional<Header> readPngHeader(std::istream& file)
   return file ? std::optional<Header>({ width, height }) : std::nullopt;
 }
 
-/** Walks the segments as far as the start of frame. */
-std::optional<Header> readJpegHeader(std::istream& file)
+/** Goes to behind the marker and length of the first segment of a JPEG file of a wanted kind; false: there is none. */
+template <typename IsWanted>
+bool goToJpegSegment(std::istream& file, const IsWanted& is_wanted)
 {
   file.seekg(2);
   while (file)
@@ -103,18 +104,29 @@ std::optional<Header> readJpegHeader(std::istream& file)
       marker = file.get();
     }
     const std::int64_t length = readNumber<2>(file);
-    const bool is_start_of_frame =
-        marker >= 0xC0 && marker <= 0xCF && marker != 0xC4 && marker != 0xC8 && marker != 0xCC;
-    if (is_start_of_frame)
+    if (is_wanted(marker))
     {
-      file.get();  // bits a sample
-      const std::int64_t height = readNumber<2>(file);
-      const std::int64_t width = readNumber<2>(file);
-      return file ? std::optional<Header>({ width, height }) : std::nullopt;
+      return static_cast<bool>(file);
     }
     file.seekg(std::max<std::int64_t>(length - 2, 0), std::ios::cur);
   }
-  return std::nullopt;
+  return false;
+}
+
+/** Of the start of frame. */
+std::optional<Header> readJpegHeader(std::istream& file)
+{
+  const auto is_start_of_frame = [](int marker) {
+    return marker >= 0xC0 && marker <= 0xCF && marker != 0xC4 && marker != 0xC8 && marker != 0xCC;
+  };
+  if (!goToJpegSegment(file, is_start_of_frame))
+  {
+    return std::nullopt;
+  }
+  file.get();  // bits a sample
+  const std::int64_t height = readNumber<2>(file);
+  const std::int64_t width = readNumber<2>(file);
+  return file ? std::optional<Header>({ width, height }) : std::nullopt;
 }
 
 /** Width and height in decimal after the magic number, between white space and comments. */
@@ -238,14 +250,19 @@ std::optional<Header> readHeader(const std::string& bytes)
 bool isTruncatedJpeg(const std::string& bytes)
 {
   constexpr std::array<char, 3> START_MARK{ '\xFF', '\xD8', '\xFF' };
-  constexpr std::array<char, 2> SCAN_MARK{ '\xFF', '\xDA' };
   constexpr std::array<char, 2> END_MARK{ '\xFF', '\xD9' };
   if (bytes.size() < START_MARK.size() || !std::equal(START_MARK.begin(), START_MARK.end(), bytes.begin()))
   {
     return false;
   }
-  // The last scan starts after any thumbnail, which has an end mark of its own. 0xFF is escaped within a scan.
-  const auto scan = std::find_end(bytes.begin(), bytes.end(), SCAN_MARK.begin(), SCAN_MARK.end());
+  // The first scan starts after any thumbnail, which has an end mark of its own. 0xFF is escaped within a scan. Whatever
+  // comes after the end mark, as a film does in pictures of some phones, does not count.
+  std::istringstream file(bytes);
+  if (!goToJpegSegment(file, [](int marker) { return marker == 0xDA; }))
+  {
+    return true;
+  }
+  const auto scan = bytes.begin() + static_cast<std::ptrdiff_t>(file.tellg());
   return std::search(scan, bytes.end(), END_MARK.begin(), END_MARK.end()) == bytes.end();
 }
 

@@ -89,20 +89,34 @@ bool matchLines(const MatchOptions& options)
   const auto matcher = makeMatcher<LineViewMatcher, LineMatcherParams>(options.settings);
   const LineMatcherParams& params = matcher.params();
   const MatchReport report(options);
-  const PreparedImage reference(readImage(options.reference), cv::Rect(), {});
-  const PreparedImage current(readImage(options.current), cv::Rect(), {});
+  const FeatureParams features(params.segments, params.features);
+  const PreparedImage reference(readImage(options.reference), cv::Rect(), features);
+  const PreparedImage current(readImage(options.current), cv::Rect(), features);
+  const GeometryModel model = MODELS.at(options.model);
+  const LineGrouping groups = GROUPS.at(options.groups);
 
+  ViewMatch match;
   const Stopwatch stopwatch;
-  Segments reference_segments = segmentsOf(reference.grey(), options.reference_segments, params.segments);
-  Segments current_segments = segmentsOf(current.grey(), options.current_segments, params.segments);
-  const double segments_ms = stopwatch.elapsedMs();
-  const LineFeatures reference_lines(reference.grey(), std::move(reference_segments), params.features);
-  const LineFeatures current_lines(current.grey(), std::move(current_segments), params.features);
-  const double prepared_ms = stopwatch.elapsedMs();
-  ViewMatch match = matcher.match(reference_lines, current_lines, MODELS.at(options.model), GROUPS.at(options.groups));
-  match.stages.insert(match.stages.begin(),
-                      { { "segments", segments_ms }, { "neighbours", prepared_ms - segments_ms } });
-  match.elapsed_ms += prepared_ms;
+  if (options.reference_segments.empty() && options.current_segments.empty())
+  {
+    reference.lines();
+    current.lines();
+    const double segments_ms = stopwatch.elapsedMs();
+    match = matcher.match(reference, current, model, groups);
+    match.stages.insert(match.stages.begin(), { "segments", segments_ms });
+    match.elapsed_ms += segments_ms;
+  }
+  else
+  {
+    const LineFeatures reference_lines(
+        reference.grey(), segmentsOf(reference.grey(), options.reference_segments, params.segments), params.features);
+    const LineFeatures current_lines(
+        current.grey(), segmentsOf(current.grey(), options.current_segments, params.segments), params.features);
+    const double segments_ms = stopwatch.elapsedMs();
+    match = matcher.match(reference_lines, current_lines, model, groups);
+    match.stages.insert(match.stages.begin(), { "segments", segments_ms });
+    match.elapsed_ms += segments_ms;
+  }
 
   return report.write(match, reference, current,
                       { { "matches", toJson(match.lines) },

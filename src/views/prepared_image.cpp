@@ -103,7 +103,9 @@ void PreparedImage::lookFromSide(Level& wanted, int side) const
   const cv::Size turned_size(static_cast<int>(std::ceil(high.x() - low.x())) + 1,
                              static_cast<int>(std::ceil(high.y() - low.y())) + 1);
   const cv::Size size(static_cast<int>(std::lround(turned_size.width / TILT)), turned_size.height);
-  if (size.width < MIN_SIDE_WIDTH)
+  constexpr int LONGEST = std::numeric_limits<short>::max() - 1;  // side of an image that cv::warpAffine() takes [px]
+  const int longest = std::max({ grey_.cols, grey_.rows, turned_size.width, turned_size.height });
+  if (size.width < MIN_SIDE_WIDTH || longest > LONGEST)
   {
     return;
   }

@@ -300,10 +300,8 @@ std::string RouteStore::remove(const std::string& name) const
         }
         catch (const std::exception&)
         {
-          if (route != name)
-          {
-            warning = "its views are kept, as route '" + route + "' is damaged and may need them";
-          }
+          warning = route == name ? "its views are kept, as it is damaged and does not say which they are"
+                                  : "its views are kept, as route '" + route + "' is damaged and may need them";
         }
       }
       if (!warning.empty())

@@ -212,6 +212,14 @@ TEST_F(ImageIoTest, ReadsJpeg)
   EXPECT_LT(largestDifference(readGreyImage(path("progressive.jpg")), toGrey(image, "image")), 8.0);
 }
 
+TEST_F(ImageIoTest, ReadsJpegWithSomethingBehindIt)
+{
+  const std::string file = writeImage("phone.jpg", randomImage(CV_8UC3, { 200, 100 }));
+  const cv::Mat alone = readGreyImage(file);
+  std::ofstream(file, std::ios::app | std::ios::binary) << "a film, with \xFF\xDA somewhere";
+  EXPECT_EQ(largestDifference(readGreyImage(file), alone), 0.0);
+}
+
 TEST_F(ImageIoTest, RefusesWhatIsNotAFile)
 {
   expectRefused(path("nothing.png"), "No such file");

@@ -116,6 +116,15 @@ TEST_F(MatchImagesLinesTest, FindsAPlane)
   EXPECT_LT(cornerError(pairs), 2.0);
 }
 
+/** It matches as line_matcher does, whose answers name too little light, and which refuses mirrored images. */
+TEST_F(MatchImagesLinesTest, SaysThatAPictureIsBlack)
+{
+  const std::string black = write("black.png", cv::Mat::zeros(360, 480, CV_8UC1));
+  const ProgramRun outcome = run({ "lines", reference_, black });
+  EXPECT_EQ(outcome.status, 1);
+  EXPECT_NE((outcome.out + outcome.err).find("black"), std::string::npos) << outcome.out << outcome.err;
+}
+
 TEST_F(MatchImagesLinesTest, JsonHasEveryField)
 {
   const json result = linesJson(0);
