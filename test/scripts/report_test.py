@@ -256,6 +256,15 @@ class Report(unittest.TestCase):
         self.assertEqual(report.verdict_of(page), (("bad", "not arrived"), "gave up"))
         self.assertIn("The bag has 2 goals; the verdict is that of the last.", report.goals_of(page))
 
+    def test_a_goal_that_has_not_ended_is_not_judged_by_the_one_before(self):
+        later = [("/status", status(t, ServoStatus.ACQUIRING, "looks"), t) for t in (7.0, 9.0)]
+        self.write(homing_messages() + later)
+        page = report.recorded_run.read_bag(self.bag, lambda bag: report.read_all(report.OnePass(bag), self.bag, self.directory))
+        self.assertNotEqual(report.verdict_of(page)[0], ("good", "arrived"))
+        numbers = dict(report.numbers_of(page))
+        self.assertNotIn("duration of the goal", numbers)
+        self.assertEqual(numbers["left to go in the end, estimated"], "not known")
+
     def test_what_a_bag_lacks_is_said_in_its_place(self):
         _, content, page = self.page([each for each in homing_messages() if each[0] == "/heading"])
         self.assertEqual(page.texts["verdict"].strip(), "no verdict the bag has no status of a driver")
