@@ -10,6 +10,11 @@
 
 namespace view_servo
 {
+namespace
+{
+constexpr double STANDS = 1e-3;  // [rad/s] or [m/s]
+}  // namespace
+
 JointGuard::JointGuard(std::map<std::string, JointLimits> limits, double margin, double max_age)
   : limits_(std::move(limits)), margin_(margin), max_age_(max_age)
 {
@@ -19,7 +24,7 @@ void JointGuard::begin(std::set<std::string> carrying)
 {
   carrying_ = std::move(carrying);
   joints_.clear();
-  stuck_since_.clear();
+  clearStuck();
 }
 
 bool JointGuard::tells(const std::vector<std::string>& names, const std::vector<double>& positions) const
@@ -86,14 +91,18 @@ std::string JointGuard::add(double time, const std::vector<std::string>& names, 
       joint.velocity = (joint.position - before->second.position) / (time - before->second.time);
     }
     joints_[names[i]] = joint;
+    last_motion_ = std::abs(joint.velocity) > STANDS ? time : last_motion_;
   }
   return unbelievable;
 }
 
 std::string JointGuard::problem(double time)
 {
-  constexpr double STANDS = 1e-3;    // [1/s]
   constexpr double PATIENCE = 0.15;  // [s]
+  constexpr double BLOCKED = 1.0;    // that no joint moves at all [s]
+  last_motion_ = is_told_ ? last_motion_ : time;
+  is_told_ = true;
+  const bool is_blocked = carrying_ && carrying_->empty() && time - last_motion_ > BLOCKED;
   std::string worst;
   for (const auto& [name, joint] : joints_)
   {
@@ -102,7 +111,7 @@ std::string JointGuard::problem(double time)
     const bool high = joint.position > limits.upper - margin_;
     const double outwards = low ? -joint.velocity : joint.velocity;
     const bool old = time - joint.time > max_age_;
-    if (old || (!low && !high) || outwards < -STANDS || !watched(name, joint))
+    if (old || (!low && !high) || outwards < -STANDS || !(is_blocked || watched(name, joint)))
     {
       stuck_since_.erase(name);
       continue;
@@ -121,6 +130,7 @@ std::string JointGuard::problem(double time)
 
 void JointGuard::clearStuck()
 {
+  is_told_ = false;
   stuck_since_.clear();
 }
 

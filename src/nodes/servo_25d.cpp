@@ -222,7 +222,7 @@ public:
     homographies_.setNeeded(true);
     camera_frame_ = withoutSlash(info_->header.frame_id);
     joints_.begin(jointsMoving(description_, camera_frame_));
-    joint_states_.setNeeded(joint_states_.fresh());
+    joint_states_.setNeeded(false);  // until one of those has been heard of
     onCameraInfo(info_);  // it may have changed since
   }
 
@@ -455,6 +455,7 @@ private:
     {
       problem = "joint '" + silent + "' does not come any more";
     }
+    joint_states_.setNeeded(task_ != nullptr);
     problem.empty() ? joint_states_.accept() : joint_states_.reject(problem + " on " + context_.quoted("joint_states"));
   }
 

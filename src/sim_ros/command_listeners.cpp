@@ -7,6 +7,7 @@
 #include <ros/console.h>
 
 #include <algorithm>
+#include <set>
 #include <vector>
 
 namespace view_servo
@@ -24,23 +25,38 @@ bool onlyShows(const std::string& node)
 
 }  // namespace
 
-std::string foreignListener(const std::string& topic, const std::string& robot)
+std::string foreignListener(const std::string& topic, const std::string& action, const std::string& robot)
 {
   const RosGraph graph;
-  for (const std::string& node : graph.subscribers(topic))
+  std::set<std::string> commands{ topic };
+  for (const std::string& server : graph.publishers(action + "/result"))
   {
-    if (node == robot || onlyShows(node))
+    for (const std::string& other : graph.publishedBy(server))
     {
-      continue;
+      const std::string type = graph.type(other);
+      if (type == "geometry_msgs/Twist" || type == "geometry_msgs/TwistStamped")
+      {
+        commands.insert(other);
+      }
     }
-    const std::vector<std::string> topics = graph.publishedBy(node);
-    if (std::any_of(topics.begin(), topics.end(), [](const std::string& other) { return other != "/rosout"; }))
+  }
+  for (const std::string& command : commands)
+  {
+    for (const std::string& node : graph.subscribers(command))
     {
-      return "'" + node + "' listens on '" + topic +
-             "', too, and would move with the simulated robot: for a real robot add sim:=false; to simulate, take a "
-             "master of your own, by export ROS_MASTER_URI=http://localhost:11411";
+      if (node == robot || onlyShows(node))
+      {
+        continue;
+      }
+      const std::vector<std::string> topics = graph.publishedBy(node);
+      if (std::any_of(topics.begin(), topics.end(), [](const std::string& other) { return other != "/rosout"; }))
+      {
+        return "'" + node + "' listens on '" + command +
+               "', too, and would move with the simulated robot: for a real robot add sim:=false; to simulate, take a "
+               "master of your own, by export ROS_MASTER_URI=http://localhost:11411";
+      }
+      ROS_WARN_STREAM("'" << node << "' listens on '" << command << "', too: if it is a robot, it will move");
     }
-    ROS_WARN_STREAM("'" << node << "' listens on '" << topic << "', too: if it is a robot, it will move");
   }
   return "";
 }

@@ -103,7 +103,8 @@ public:
     const std::string why = waitUntilReady(params_.patience, missing);
     images.shutdown();
     require(why);
-    const std::string foreign = foreignListener(nh_.resolveName("cmd_vel"), nh_.resolveName(robot_));
+    const std::string foreign =
+        foreignListener(nh_.resolveName("cmd_vel"), nh_.resolveName(action_name_), nh_.resolveName(robot_));
     if (!foreign.empty())
     {
       throw std::runtime_error(foreign);

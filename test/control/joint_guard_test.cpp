@@ -107,6 +107,28 @@ TEST(JointGuard, LetsAGripperRestAtItsLimit)
   }
 }
 
+/** Which joint moves the camera may not be known: then one at its limit counts where the arm does not move at all. */
+TEST(JointGuard, NamesTheJointThatBlocksTheArmFromTheStart)
+{
+  JointGuard guard({ { "elbow", { -1.0, 2.0 } }, { "wrist", { -3.0, 3.0 } } }, 0.02, 1.0);
+  guard.begin({});
+  std::string problem;
+  double time = 0.0;
+  for (; problem.empty() && time < 3.0; time += 0.1)
+  {
+    guard.add(time, { "elbow", "wrist" }, { 1.99, 0.5 }, { 0.0, 0.0 });
+    problem = guard.problem(time);
+  }
+  EXPECT_NE(problem.find("'elbow'"), std::string::npos);
+  EXPECT_NEAR(time, 1.3, 0.25);
+  guard.begin({});
+  for (time = 0.0; time < 3.0; time += 0.1)
+  {
+    guard.add(time, { "elbow", "wrist" }, { 1.99, 0.5 + 0.1 * time }, { 0.0, 0.1 });
+    EXPECT_EQ(guard.problem(time), "") << "the arm moves";
+  }
+}
+
 TEST(JointGuard, KnowsWhichMessagesTellOfTheArm)
 {
   JointGuard guard({ { "elbow", { -1.0, 2.0 } }, { "finger", { 0.0, 0.04 } } }, 0.02, 1.0);

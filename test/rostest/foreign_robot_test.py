@@ -17,18 +17,25 @@ from nav_msgs.msg import Odometry  # noqa: E402
 
 
 class ForeignRobot(graph.GraphTest):
-    def test_does_not_move(self):
+    def check(self, topic, *arguments):
+        """A run with a robot that listens on a topic."""
         commands = []
         odometry = rospy.Publisher("/wheels/odom", Odometry, queue_size=1)
-        subscriber = rospy.Subscriber("/cmd_vel", Twist, commands.append)
+        subscriber = rospy.Subscriber(topic, Twist, commands.append)
         self.addCleanup(odometry.unregister)
         self.addCleanup(subscriber.unregister)
-        run = subprocess.run(["roslaunch", "view_servo", "homing.launch"], env=self.graph.environment, cwd=self.directory,
-                             stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.STDOUT,
+        run = subprocess.run(["roslaunch", "view_servo", "homing.launch", *arguments], env=self.graph.environment,
+                             cwd=self.directory, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.STDOUT,
                              universal_newlines=True, timeout=120.0 * graph.SLOWDOWN, check=False)
-        self.assertIn("'%s' listens on '/cmd_vel', too, and would move with the simulated robot: for a real robot add "
-                      "sim:=false" % rospy.get_name(), run.stdout)
+        self.assertIn("'%s' listens on '%s', too, and would move with the simulated robot: for a real robot add sim:=false" % (
+            rospy.get_name(), topic), run.stdout)
         self.assertFalse(any(command.linear.x or command.linear.y or command.angular.z for command in commands))
+
+    def test_does_not_move(self):
+        self.check("/cmd_vel")
+
+    def test_does_not_move_by_commands_of_another_name(self):
+        self.check("/mobile_base/commands", "cmd_vel:=/mobile_base/commands")
 
 
 if __name__ == "__main__":

@@ -33,7 +33,7 @@ public:
   /**
    * A new goal begins: what was heard of joints before is forgotten.
    * @param carrying joints that move the camera, which alone are watched from now on; a gripper's may rest at a limit.
-   * Empty: they are not known, and any joint is watched that has moved since.
+   * Empty: they are not known, and any joint is watched that has moved since, and all while none moves as it should.
    */
   void begin(std::set<std::string> carrying);
 
@@ -84,6 +84,8 @@ private:
   std::map<std::string, JointLimits> limits_;
   double margin_;
   double max_age_;
+  double last_motion_ = 0.0;                       // of any joint, or when the arm was told to move [s]
+  bool is_told_ = false;                           // to move, by the last problem() or clearStuck()
   std::optional<std::set<std::string>> carrying_;  // empty before begin(): all are watched
   std::map<std::string, Joint> joints_;
   std::map<std::string, double>
