@@ -100,10 +100,14 @@ void PlaceWatch::add(const Eigen::Isometry3d& camera, const Eigen::Isometry3d& v
     doubtful_way_.contradicted = doubtful_way_.contradicted && !forgotten;
     doubtful_turn_.contradicted = doubtful_turn_.contradicted && !forgotten;
   }
-  // The first sight of another place may still be on its way there, and would seem to move with the next one.
-  if (jumped || !last_ || is_new_)
+  if (jumped || !last_)
   {
     proof_from_ = doubtful_way_.from = doubtful_turn_.from = now;
+  }
+  else if (is_new_)
+  {
+    proof_from_ =
+        now;  // the first sight of another place may still be on its way there, and seem to move with this one
   }
   is_new_ = jumped;
   last_ = now;

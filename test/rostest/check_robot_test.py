@@ -407,14 +407,14 @@ class CheckRobot(graph.GraphTest):
         self.assertEqual(listening.returncode, 130)
 
     def test_7_bad_input(self):
-        cases = []
         for launch_file in ("homing", "arm_servo"):  # what may be given to these may be given to this program
             with open(os.path.join(ROOT, "launch", launch_file + ".launch"), encoding="utf-8") as file:
                 names = re.findall(r'<arg name="(\w+)" default=', file.read())
             values = {"dry_run": "true", "base": "differential"}
-            cases.append(([launch_file] + [name + ":=" + values.get(name, "x") for name in names] + ["further:=x"],
-                          launch_file + ".launch has no argument 'further'"))
-        for arguments, words in (*cases, (["--what"], "--what"), (["odm:=/odom"], "homing.launch has no argument 'odm'"),
+            words = [name + ":=" + values.get(name, "x") for name in names]
+            process = self.begin("bad", *words, "further:=x", arm=launch_file == "arm_servo")
+            self.assertIn(launch_file + ".launch has no argument 'further'", process.communicate(timeout=PATIENCE)[1])
+        for arguments, words in ((["--what"], "--what"), (["odm:=/odom"], "homing.launch has no argument 'odm'"),
                                  (["joint_states:=/j"], "no argument 'joint_states'"), (["--seconds", "0"], "--seconds"),
                                  (["base:=square"], "holonomic or differential"), (["dry_run:=perhaps"], "dry_run"), (["--distance", "5", "--move"], "--distance")):
             process = self.begin("bad", *arguments)

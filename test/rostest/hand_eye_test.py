@@ -164,7 +164,7 @@ class HandEye(graph.GraphTest):
                 ("--file arm.bag --view box --flange wrist", "its tf does not know 'wrist' in 'base_link'.*--flange"),
                 ("--file arm.bag --view box --camera nobody", "no camera_info is in it on '/nobody/camera_info'"),
                 ("--file arm.bag --view box --tracker nobody", "no homography of view 'box' is in it on '/nobody/homography'"),
-                ("--file poses.yaml --out nowhere/m.yaml", "--out: there is no directory 'nowhere': make it first"),
+                ("--file poses.yaml --keep nowhere/p.yaml", "--keep: there is no directory 'nowhere': make it first"),
                 ("--file poses.yaml --keep poses.yaml", "'poses.yaml' exists: say --overwrite, or another file by --keep"),
                 ("--file nowhere.bag --view box", "nowhere.bag.*no such file"),
                 ("--file nowhere.yaml", "nowhere.yaml.*no such file"),
