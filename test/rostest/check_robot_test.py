@@ -416,7 +416,8 @@ class CheckRobot(graph.GraphTest):
             self.assertIn(launch_file + ".launch has no argument 'further'", process.communicate(timeout=PATIENCE)[1])
         for arguments, words in ((["--what"], "--what"), (["odm:=/odom"], "homing.launch has no argument 'odm'"),
                                  (["joint_states:=/j"], "no argument 'joint_states'"), (["--seconds", "0"], "--seconds"),
-                                 (["base:=square"], "holonomic or differential"), (["dry_run:=perhaps"], "dry_run"), (["--distance", "5", "--move"], "--distance")):
+                                 (["base:=square"], "holonomic or differential"), (["dry_run:=perhaps"], "dry_run"),
+                                 (["--distance", "5", "--move"], "--distance")):
             process = self.begin("bad", *arguments)
             text, errors = process.communicate(timeout=PATIENCE)
             self.assertEqual((process.returncode, text), (2, ""))
