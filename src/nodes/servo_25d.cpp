@@ -223,7 +223,7 @@ public:
     camera_frame_ = withoutSlash(info_->header.frame_id);
     joints_.begin(jointsMoving(description_, camera_frame_));
     joint_states_.setNeeded(false);  // until one of those has been heard of
-    onCameraInfo(info_);  // it may have changed since
+    onCameraInfo(info_);             // it may have changed since
   }
 
   void end()
