@@ -51,9 +51,12 @@ std::string foreignListener(const std::string& topic, const std::string& action,
       const std::vector<std::string> topics = graph.publishedBy(node);
       if (std::any_of(topics.begin(), topics.end(), [](const std::string& other) { return other != "/rosout"; }))
       {
-        return "'" + node + "' listens on '" + command +
-               "', too, and would move with the simulated robot: for a real robot add sim:=false; to simulate, take a "
-               "master of your own, by export ROS_MASTER_URI=http://localhost:11411";
+        std::string fault = "'";
+        fault.append(node).append("' listens on '").append(command);
+        fault +=
+            "', too, and would move with the simulated robot: for a real robot add sim:=false; to simulate, take a "
+            "master of your own, by export ROS_MASTER_URI=http://localhost:11411";
+        return fault;
       }
       ROS_WARN_STREAM("'" << node << "' listens on '" << command << "', too: if it is a robot, it will move");
     }
