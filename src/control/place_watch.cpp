@@ -29,6 +29,12 @@ void PlaceWatch::restart(const Eigen::Isometry3d& place)
   believed_ = place;
 }
 
+void PlaceWatch::doubt()
+{
+  trusted_ = false;
+  is_new_ = true;
+}
+
 void PlaceWatch::interrupt()
 {
   interrupted_ = true;
@@ -71,7 +77,7 @@ void PlaceWatch::Doubt::add(double moved, Verdict verdict, double limit, const S
   }
 }
 
-void PlaceWatch::add(const Eigen::Isometry3d& camera, const Eigen::Isometry3d& view_in_camera, double unit)
+bool PlaceWatch::add(const Eigen::Isometry3d& camera, const Eigen::Isometry3d& view_in_camera, double unit)
 {
   constexpr double BY_RANGE = 0.05;  // part of the distance of the view by which its place may change
   // Part of the camera's way since the last sight by which it may, too, as the unit is not known well. Not by all of it
@@ -122,6 +128,7 @@ void PlaceWatch::add(const Eigen::Isometry3d& camera, const Eigen::Isometry3d& v
                     limits_.doubt, now);
   doubtful_turn_.add(rotationVector(step.linear()).norm(),
                      judge(doubtful_turn_.from, now, NEVER, limits_.doubt_turn / 2.0), limits_.doubt_turn, now);
+  return jumped;
 }
 
 }  // namespace view_servo

@@ -27,6 +27,7 @@ namespace view_servo
 namespace
 {
 constexpr PlaceWatchLimits PLACE_LIMITS{ 0.004, 0.01, 0.004, 0.01, 0.05, 0.15 };
+constexpr double DEAD_TIMES[] = { 0.0, 0.15, 0.3 };  // of the arms that are thought of [s]
 
 /** The displacement of a body that moves by a twist of its own for a time: where its frame is in the former one. */
 Eigen::Isometry3d displacement(const Twist& twist, double duration)
@@ -108,10 +109,7 @@ struct Servo25d::Task
 };
 
 Servo25d::Servo25d(const ServoTarget& target, const Servo25dParams& params)
-  : params_(params),
-    target_(target),
-    chosen_((target.k.inverse() * target.point.homogeneous()).hnormalized()),
-    watch_(PLACE_LIMITS)
+  : params_(params), target_(target), chosen_((target.k.inverse() * target.point.homogeneous()).hnormalized())
 {
   requireNoFaults("parameters of 2.5D servoing", params.validate());
   if (!(gainsAt(target.point).minCoeff() > 0.0))
@@ -119,6 +117,10 @@ Servo25d::Servo25d(const ServoTarget& target, const Servo25dParams& params)
     throw std::invalid_argument("the chosen point of the view is outside the image or within its margin");
   }
   task_ = std::make_unique<Task>(params);
+  for (const double dead_time : DEAD_TIMES)
+  {
+    cameras_.push_back({ dead_time, PlaceWatch(PLACE_LIMITS) });
+  }
 }
 
 Servo25d::~Servo25d() = default;
@@ -166,7 +168,20 @@ void Servo25d::add(const PlaneView& view)
   view_in_camera.translation() = view.motion.translation_over_distance;
   if (!sent_.empty())  // in a dry run nobody knows how the camera moves
   {
-    watch_.add(camera_, view_in_camera, distance());
+    bool jumped = false;
+    for (CommandedCamera& camera : cameras_)
+    {
+      jumped = camera.watch.add(camera.pose, view_in_camera, distance()) || jumped;
+    }
+    // How far the camera has moved unseen depends on how late the arm follows: it may be less than any of them says.
+    for (CommandedCamera& camera : cameras_)
+    {
+      if (jumped && interrupted_)
+      {
+        camera.watch.doubt();
+      }
+    }
+    interrupted_ = false;
   }
   updateReport();
   judge(view.stamp);
@@ -176,9 +191,22 @@ void Servo25d::moveOnTo(double stamp)
 {
   if (moved_until_ && stamp > *moved_until_)
   {
-    camera_ = camera_ * motionSince(*moved_until_, stamp).inverse();
+    for (CommandedCamera& camera : cameras_)
+    {
+      camera.pose = camera.pose * motionSince(*moved_until_ - camera.dead_time, stamp - camera.dead_time).inverse();
+    }
   }
   moved_until_ = moved_until_ ? std::max(*moved_until_, stamp) : stamp;
+}
+
+bool Servo25d::trusted() const
+{
+  return std::any_of(cameras_.begin(), cameras_.end(), [](const auto& camera) { return camera.watch.trusted(); });
+}
+
+bool Servo25d::contradicted() const
+{
+  return std::all_of(cameras_.begin(), cameras_.end(), [](const auto& camera) { return camera.watch.contradicted(); });
 }
 
 void Servo25d::updateReport()
@@ -197,14 +225,13 @@ void Servo25d::judge(double stamp)
 {
   const bool at_view = report_.translation_error <= params_.translation_tolerance &&
                        report_.rotation_error <= params_.rotation_tolerance;
-  if (watch_.contradicted() || (at_view && !watch_.trusted()))
+  if (contradicted() || (at_view && !trusted()))
   {
     within_since_.reset();
     doubted_since_ = doubted_since_.value_or(stamp);
     report_.state = stamp - *doubted_since_ > params_.lost_timeout ? ServoState::FAILED : ServoState::LOST;
-    report_.reason = watch_.contradicted()
-                         ? "the picture does not move as the camera is told to"
-                         : "the view appeared at once where it was not, and has not been seen to move since";
+    report_.reason = contradicted() ? "the picture does not move as the camera is told to"
+                                    : "the view appeared at once where it was not, and has not been seen to move since";
     return;
   }
   doubted_since_.reset();
@@ -239,7 +266,11 @@ void Servo25d::addLoss(double stamp, const std::string& reason)
   {
     return;
   }
-  watch_.interrupt();
+  interrupted_ = true;
+  for (CommandedCamera& camera : cameras_)
+  {
+    camera.watch.interrupt();
+  }
   if (stamp - *lost_since_ > params_.lost_timeout)
   {
     report_.state = ServoState::FAILED;

@@ -109,7 +109,15 @@ public:
     {
       servo.sent(time_, twist);
     }
-    camera_ = moved(camera_, twist, CONTROL);
+    commands_.push_back({ time_ + dead_time, twist });
+    while (commands_.size() > 1 && commands_[1].first <= time_ + 1e-9)
+    {
+      commands_.pop_front();
+    }
+    if (commands_.front().first <= time_ + 1e-9)
+    {
+      camera_ = moved(camera_, commands_.front().second, CONTROL);
+    }
     time_ += CONTROL;
     return twist;
   }
@@ -121,6 +129,7 @@ public:
   bool feed_forward = true;
   bool tell_distance = false;
   bool visible = true;
+  double dead_time = 0.0;  // after which the arm does what it is told [s]
   std::function<Eigen::Isometry3d(const Eigen::Isometry3d&)>
       shown;  // from where a camera sees the plane; empty: from its pose
 
@@ -130,6 +139,7 @@ private:
   double time_ = 0.0;
   double next_image_ = 0.0;
   std::deque<PlaneView> images_;
+  std::deque<std::pair<double, Twist>> commands_;  // from when on the arm follows which
 };
 
 /**
@@ -394,6 +404,27 @@ TEST(Servo25d, TakesOtherGainsWhileItDrives)
   EXPECT_THROW(servo.setGains(0.0, 1.0), std::invalid_argument);
 }
 
+TEST(Servo25d, ConvergesWithArmsThatFollowLate)
+{
+  const Eigen::Vector3d normal = Eigen::Vector3d(0.1, 0.2, 1.0).normalized();
+  for (const double dead_time : { 0.05, 0.1, 0.15, 0.2, 0.25, 0.3, 0.35, 0.4 })
+  {
+    for (std::uint64_t seed = 1; seed <= 16; ++seed)
+    {
+      Rng rng(seed);
+      Plant plant(randomCamera(rng, normal), normal, Servo25dParams());
+      plant.dead_time = dead_time;
+      while (plant.servo.report().state != ServoState::CONVERGED && plant.time() < 60.0)
+      {
+        plant.step();
+        ASSERT_NE(plant.servo.report().state, ServoState::FAILED)
+            << dead_time << " s, seed " << seed << ", at " << plant.time() << " s: " << plant.servo.report().reason;
+      }
+      EXPECT_LT(plant.camera().translation().norm(), 0.0015) << dead_time << " s, seed " << seed;
+    }
+  }
+}
+
 // ---- what looks like the view and is not
 
 class Servo25dCopiesTest : public testing::Test
@@ -473,6 +504,7 @@ TEST_F(Servo25dCopiesTest, ConvergesWhenThePictureIsTakenAway)
 
 TEST_F(Servo25dCopiesTest, StandsWhenTheCameraSendsOneImageAgainAndAgain)
 {
+  constexpr double FARTHEST = 0.18;  // the arm may be one that follows late [m]
   for (const double begin : { 0.0, 0.3, 0.8 })
   {
     Plant plant = start();
@@ -483,7 +515,7 @@ TEST_F(Servo25dCopiesTest, StandsWhenTheCameraSendsOneImageAgainAndAgain)
     };
     run(plant, 30.0);
     EXPECT_EQ(plant.servo.report().state, ServoState::FAILED) << begin << ": " << plant.servo.report().reason;
-    EXPECT_LT((plant.camera().translation() - before.translation()).norm(), 0.12) << begin;
+    EXPECT_LT((plant.camera().translation() - before.translation()).norm(), FARTHEST) << begin;
   }
 }
 

@@ -36,8 +36,9 @@ public:
    * @param camera pose of the camera by odometry or by commands, in a frame that stays [m].
    * @param view_in_camera pose of the view's camera in the present one, as the image shows it [unit].
    * @param unit length of the unit of view_in_camera as far as it is known [m].
+   * @return whether its place has jumped.
    */
-  void add(const Eigen::Isometry3d& camera, const Eigen::Isometry3d& view_in_camera, double unit);
+  bool add(const Eigen::Isometry3d& camera, const Eigen::Isometry3d& view_in_camera, double unit);
 
   /**
    * What view_in_camera is measured by has changed, so that motions cannot be compared across it. Call it before the
@@ -45,6 +46,9 @@ public:
    * @param place pose of the view's camera as it was believed to be, in the frame of `camera` [m].
    */
   void restart(const Eigen::Isometry3d& place);
+
+  /** The last sight is not to be trusted, for another reason than that its place has jumped. */
+  void doubt();
 
   /** The view is not seen, for so long that the camera may have moved far before the next sight. */
   void interrupt();

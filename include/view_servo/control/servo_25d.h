@@ -118,7 +118,8 @@ Progress toProgress(const ServoReport& report);
  * So the point turns back at the margin, whatever the distance.
  *
  * A view that does not move as the commands move the camera, as a picture of it held before the camera, is not
- * believed: the camera stands, and servoing gives up after params.lost_timeout.
+ * believed: the camera stands, and servoing gives up after params.lost_timeout. The arm may follow at once or up to
+ * 0.4 s later.
  *
  * When an image has been evaluated, the camera has already moved on by the commands since. This motion is fed forward,
  * so that errors decay as commanded.
@@ -170,8 +171,20 @@ private:
     Twist twist;
   };
 
-  /** Takes camera_ to the time of an image. */
+  /** The camera of an arm that follows each twist after a dead time. */
+  struct CommandedCamera
+  {
+    double dead_time;  // [s]
+    PlaceWatch watch;
+    Eigen::Isometry3d pose = Eigen::Isometry3d::Identity();  // at the last image, by the twists sent since the first
+  };
+
+  /** Takes the commanded cameras to the time of an image. */
   void moveOnTo(double stamp);
+  /** Whether the view may be taken for reached; see PlaceWatch. */
+  bool trusted() const;
+  /** Whether the view does not move as the camera is told to, whatever the dead time. */
+  bool contradicted() const;
   /** How the camera has moved by the twists that were sent: X_end = motion X_begin. */
   Eigen::Isometry3d motionSince(double begin, double end) const;
   /** ServoReport::gains of a chosen point at a pixel. */
@@ -189,12 +202,11 @@ private:
   std::optional<PlaneView> view_;   // the last one
   std::optional<double> distance_;  // d, once it is known [m]
   std::deque<Sent> sent_;
-  Eigen::Isometry3d camera_ = Eigen::Isometry3d::Identity();  // at the last image, by the twists sent since the first
-  std::optional<double> moved_until_;                         // stamp of that image [s]
-  PlaceWatch watch_;
-  std::optional<double>
-      doubted_since_;                 // stamp of the first image that watch_ does not believe [s]; empty while it does
-  std::optional<double> lost_since_;  // stamp of the first image without the view [s]; empty while it is seen
+  std::vector<CommandedCamera> cameras_;
+  bool interrupted_ = false;             // the view was not seen before the next image
+  std::optional<double> moved_until_;    // stamp of the image that the poses of cameras_ are of [s]
+  std::optional<double> doubted_since_;  // stamp of the first image that is not believed [s]; empty while they are
+  std::optional<double> lost_since_;     // stamp of the first image without the view [s]; empty while it is seen
   std::optional<double>
       within_since_;  // stamp since which both errors are within tolerance [s]; empty while they are not
   ServoReport report_;
