@@ -14,10 +14,12 @@ BaseVelocity towards(double speed, double heading, double turn_rate)
   return { speed * std::cos(heading), speed * std::sin(heading), turn_rate };
 }
 
-/** Proportional to what is left, but no slower than `least`; zero within the tolerance. */
+/** Proportional to what is left, but no slower than `least`, and never faster than `most`; zero within the tolerance. */
 double approach(double left, double gain, double least, double most, double tolerance)
 {
-  return std::abs(left) <= tolerance ? 0.0 : std::copysign(std::clamp(gain * std::abs(left), least, most), left);
+  return std::abs(left) <= tolerance
+             ? 0.0
+             : std::copysign(std::clamp(gain * std::abs(left), std::min(least, most), most), left);
 }
 
 /**

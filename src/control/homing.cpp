@@ -350,6 +350,10 @@ protected:
           in_place_ = *view_in_odom_;
         }
       }
+      else
+      {
+        watch_.interrupt();
+      }
     }
     if (view_in_odom_)
     {
@@ -533,13 +537,19 @@ private:
   void checkStructure(const HeadingHypothesis& best, const Correspondences& matches, const PlanarPose& camera)
   {
     constexpr double CLEARLY_LESS = 0.7;
+    constexpr double NEARLY_INFINITE = -0.02;  // as the estimators have it [1 / distance moved]
+    if (report_.tracked && report_.displacement <= params_.hypotheses.inlier_threshold)
+    {
+      return;  // where nothing has moved, any motion explains matches
+    }
     const PlanarPose pose = compose(inverse(camera), *view_in_odom_);
+    const double farthest = NEARLY_INFINITE / pose.distance();
     const double threshold = params_.hypotheses.inlier_threshold / target_.camera.k(0, 0);
     const Eigen::Matrix3d essential = essentialMatrix(pose);
     Correspondences agreeing;
     for (const Correspondence& match : matches)
     {
-      if (sampsonError(essential, match) <= threshold * threshold && inverseDepth(match, pose).value > 0.0)
+      if (sampsonError(essential, match) <= threshold * threshold && inverseDepth(match, pose).value >= farthest)
       {
         agreeing.push_back(match);
       }
@@ -605,7 +615,12 @@ private:
     constexpr double WEIGHT = 0.2;
     constexpr double MAX_CHANGE = 4.0;
     constexpr double MAX_SCALE = 20.0;
+    constexpr double NOT_MOVED = 0.001;  // [m]
     const PlanarPose camera_in_view = inverse(view_in_camera);
+    if (!trail_.empty() && compose(inverse(trail_.back().in_odom), camera_in_odom).distance() < NOT_MOVED)
+    {
+      return;  // a camera that stands says nothing new
+    }
     trail_.push_back({ camera_in_odom, camera_in_view });
     while (trail_.size() > 2 && compose(inverse(trail_[1].in_odom), camera_in_odom).distance() > LONGEST)
     {
@@ -637,6 +652,7 @@ private:
     }
     const PlanarPose goal = reportGoal(base);
     report_.at_view = report_.contradicted = false;
+    report_.trusted = watch_.trusted();
     const bool blank = std::isnan(report_.similarity);
     const double unseen = stamp - last_trace_;
     if (!law_->failure().empty())
@@ -699,7 +715,11 @@ private:
     if (isMetric())
     {
       report_.goal_in_odom = goalInOdom();
-      report_.goal_covariance = view_covariance_;
+      // The base stands beside its camera: an error of the view's yaw moves it about there.
+      Eigen::Matrix3d by_view = Eigen::Matrix3d::Identity();
+      by_view(0, 2) = view_in_odom_->y - report_.goal_in_odom->y;
+      by_view(1, 2) = report_.goal_in_odom->x - view_in_odom_->x;
+      report_.goal_covariance = by_view * view_covariance_ * by_view.transpose();
     }
     return goal;
   }

@@ -47,6 +47,18 @@ std::optional<PlanarPose> OdometryHistory::at(double stamp, double reach) const
   {
     return entries_.front().pose;
   }
+  if (stamp > entries_.back().stamp)
+  {
+    // By poses that are some way apart: of two that came in a burst the rounding would be extrapolated.
+    constexpr double APART = 0.05;  // [s]
+    const Entry& newest = entries_.back();
+    auto before = entries_.end() - 2;
+    while (before != entries_.begin() && newest.stamp - before->stamp < APART)
+    {
+      --before;
+    }
+    return between(before->pose, newest.pose, (stamp - before->stamp) / (newest.stamp - before->stamp));
+  }
   auto after = std::lower_bound(entries_.begin(), entries_.end(), stamp,
                                 [](const Entry& entry, double time) { return entry.stamp < time; });
   after = std::clamp(after, entries_.begin() + 1, entries_.end() - 1);

@@ -83,7 +83,7 @@ void RouteGuide::addReport(const HomingReport& report, const PlanarPose& base)
     return;
   }
   blind_distance_ = blind_turn_ = 0.0;
-  if (!report.tracked)
+  if (!report.tracked || !report.trusted)
   {
     return;
   }

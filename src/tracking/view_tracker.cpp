@@ -131,7 +131,12 @@ std::vector<Parameter> parameters(ViewTrackerParams& params)
 
 std::vector<std::string> ViewTrackerParams::validate() const
 {
-  return faultsOf(*this);
+  std::vector<std::string> faults = faultsOf(*this);
+  if (max_landmarks < min_supporting)
+  {
+    faults.emplace_back("max_landmarks must not be below tracking_min_supporting");
+  }
+  return faults;
 }
 
 ViewTracker::ViewTracker(const cv::Mat& reference, const Camera& camera, const CameraMount& mount,

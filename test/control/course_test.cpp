@@ -56,6 +56,8 @@ TEST(Course, KeepsToItsSpeeds)
   EXPECT_NEAR(along(course, PlanarPose()).x(), 0.1, 1e-12);
   course.min_speed = 0.1;
   EXPECT_NEAR(along(course, { 1.99, 0.0, 0.0 }).x(), 0.1, 1e-12);
+  course.max_speed = 0.02;
+  EXPECT_NEAR(along(course, { 1.99, 0.0, 0.0 }).x(), 0.02, 1e-12) << "the limit counts";
 }
 
 RC_GTEST_PROP(Course, GoesAStepInItsDirectionWithoutTurning, ())

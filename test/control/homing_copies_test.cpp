@@ -47,6 +47,21 @@ TEST_P(HomingCopiesTest, DoesNotArriveAtAPictureHeldBeforeTheCamera)
   }
 }
 
+TEST_P(HomingCopiesTest, DoesNotArriveAtAPictureThatComesAfterTheViewWasOutOfSight)
+{
+  const Walls walls;
+  for (const double distance : { 0.5, 0.4, 0.3, 0.2, 0.1 })
+  {
+    Drive run(walls, paramsOf(GetParam()), { -0.5, -0.2, 0.1 });
+    approach(run, distance);
+    run.runFor(1.5, Drive::Sight::NO_MATCHES);
+    const PlanarPose before = run.base();
+    run.runFor(45.0, Drive::Sight::COPY);
+    EXPECT_EQ(run.report().state, HomingState::FAILED) << distance << ": " << run.report().reason;
+    EXPECT_LT(compose(inverse(before), run.base()).distance(), 0.15) << distance;
+  }
+}
+
 TEST_P(HomingCopiesTest, GoesOnWhenThePictureIsTakenAway)
 {
   const Walls walls;

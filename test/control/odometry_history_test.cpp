@@ -49,6 +49,15 @@ TEST(OdometryHistory, GivesWhatWasThereAndInterpolates)
   expectPose(history.newest(), 0.2, -0.5, 0.4);
 }
 
+TEST(OdometryHistory, IsNotMisledByABurst)
+{
+  OdometryHistory history = drive();
+  history.add(102.001, { 0.204, -0.5, 0.4 });  // 4 mm within a millisecond
+  const std::optional<PlanarPose> later = history.at(102.201);
+  ASSERT_TRUE(later);
+  EXPECT_NEAR(later->x, 0.22, 0.02);
+}
+
 TEST(OdometryHistory, GoesOnForALittleWhile)
 {
   const OdometryHistory history = drive();

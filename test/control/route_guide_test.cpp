@@ -142,6 +142,20 @@ TEST(RouteGuide, DoesNotLeadToWhatDoesNotMoveAsTheBaseDoes)
   EXPECT_FALSE(guide.blindCourse());
 }
 
+TEST(RouteGuide, DoesNotGoOnFromAViewThatIsNotTrusted)
+{
+  RouteGuide guide(RouteGuideParams(), makeRoute().stops, 0.1);
+  const PlanarPose base{ 1.0, 1.0, 0.0 };
+  HomingReport report = trackedReport(base, base, true);
+  report.displacement = 0.0;
+  report.trusted = false;
+  guide.addReport(report, base);
+  EXPECT_FALSE(guide.isTimeToGoOn());
+  report.trusted = true;
+  guide.addReport(report, base);
+  EXPECT_TRUE(guide.isTimeToGoOn());
+}
+
 TEST(RouteGuide, LeadsByOdometryWithinBounds)
 {
   RouteGuideParams params;

@@ -86,6 +86,7 @@ struct HomingReport
   std::string manoeuvre;  ///< what a base that cannot slide does at the moment; empty: nothing worth a word
   bool contradicted =
       false;             ///< what is seen does not move as the base does: it is not the view, or not where it seems
+  bool trusted = true;   ///< nothing speaks against the view's being where it is seen; see PlaceWatch
   bool at_view = false;  ///< the base is within arrival_distance and arrival_yaw, and the image looks like the view
   /**
    * Direction in base_link to the base's position at the view: 0 = straight ahead, positive to the left [rad],
