@@ -117,7 +117,9 @@ double PlaneFilter::Track::scatter() const
 double PlaneFilter::Track::deviation() const
 {
   constexpr double ENOUGH = 100.0;  // images that err independently
-  return std::sqrt(0.5 * scatter() / std::min(ENOUGH, static_cast<double>(std::max<std::size_t>(1, count))));
+  constexpr double OF_ONE = 0.02;   // scatter that one image hides, and few hide a part of [rad²]
+  const double images = std::max(1.0, static_cast<double>(count));
+  return std::sqrt(0.5 * (scatter() + OF_ONE / (images * images)) / std::min(ENOUGH, images));
 }
 
 PlaneFilter::PlaneFilter(const PlaneFilterParams& params) : params_(params)
@@ -135,6 +137,11 @@ void PlaneFilter::add(const std::optional<Eigen::Isometry3d>& camera_in_odom, co
   }
   followNormals(decomposeHomography(h, k, seen));  // none, as a rule, where the views agree
   const Measurement measurement{ camera_in_odom, calibrated };
+  if (camera_in_odom && !measurements_.empty() && !measurements_.back().camera_in_odom && !places_.empty() &&
+      !agrees(measurement, motionBefore(places_.back().calibrated, normal()), *places_.back().camera_in_odom))
+  {
+    places_.clear();  // odometry has begun anew while it was not there
+  }
   if (camera_in_odom && !measurements_.empty() && measurements_.back().camera_in_odom)
   {
     const Measurement& last = measurements_.back();
@@ -176,7 +183,7 @@ bool PlaneFilter::agrees(const Measurement& measurement, const EuclideanHomograp
 void PlaneFilter::followNormals(const std::vector<EuclideanHomography>& solutions)
 {
   constexpr double LEAST_TRANSLATION = 0.03;  // over d: a shorter one does not tell the normal
-  constexpr std::size_t FEWEST = 8;           // measurements before the scatter tells
+  constexpr int FEWEST = 8;                   // measurements before the scatter tells
   constexpr double NOISE = 1e-4;              // scatter that noise alone may have [rad²]
   constexpr double SAME_NORMAL = 0.9;         // cosine: a measurement further away is of neither
   std::vector<EuclideanHomography> usable;
@@ -187,8 +194,20 @@ void PlaneFilter::followNormals(const std::vector<EuclideanHomography>& solution
   {
     return;
   }
+  const auto is_near = [&](const Track& track, const EuclideanHomography& solution) {
+    return solution.normal.dot(track.normal()) > SAME_NORMAL;
+  };
+  const bool is_other = std::none_of(tracks_.begin(), tracks_.end(), [&](const Track& track) {
+    return std::any_of(usable.begin(), usable.end(), [&](const auto& solution) { return is_near(track, solution); });
+  });
+  others_ = is_other ? others_ + 1 : 0;
+  if (others_ >= FEWEST)
+  {
+    tracks_.clear();  // what was seen first, from too near to the view, was no normal
+  }
   if (tracks_.empty())
   {
+    others_ = 0;
     for (const EuclideanHomography& solution : usable)
     {
       tracks_.emplace_back();
@@ -292,7 +311,15 @@ std::optional<OdometryScale> PlaneFilter::distance(const Eigen::Vector3d& normal
   {
     ways.push_back({ motionBefore(place.calibrated, normal).translation_over_distance, *place.camera_in_odom });
   }
-  return tracks_.empty() ? std::nullopt : scaleByOdometry(ways, params_.window);
+  if (tracks_.empty())
+  {
+    return std::nullopt;
+  }
+  // After a short way, too, where the images are so exact that it tells.
+  constexpr double OF_WINDOW = 0.3;
+  constexpr double LARGEST_DEVIATION = 0.04;
+  const std::optional<OdometryScale> early = scaleByOdometry(ways, OF_WINDOW * params_.window);
+  return early && early->relative_deviation <= LARGEST_DEVIATION ? early : scaleByOdometry(ways, params_.window);
 }
 
 PlaneEstimate PlaneFilter::estimateOf(const Measurement& last) const

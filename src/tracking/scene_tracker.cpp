@@ -8,6 +8,7 @@
 #include "scene_structure.h"
 #include "view_servo/geometry/homography.h"
 #include "view_servo/geometry/region.h"
+#include "view_servo/geometry/rotation_vector.h"
 #include "view_servo/parameters/faults.h"
 #include "view_servo/robust/quantile.h"
 
@@ -87,6 +88,8 @@ private:
     return 2.0 / (k_(0, 0) + k_(1, 1));
   }
   Eigen::Isometry3d predict(const std::optional<Eigen::Isometry3d>& camera_in_odom) const;
+  bool contradictsOdometry(const Eigen::Isometry3d& motion, const Eigen::Isometry3d& camera_in_odom) const;
+  void forgetOdometry();
   Sight look(const std::vector<cv::Mat>& pyramid, const Eigen::Isometry3d& predicted) const;
   Sight lookFrom(const std::vector<cv::Mat>& pyramid, const Eigen::Isometry3d& predicted, int coarsest) const;
   std::vector<SceneSighting> alignAll(const cv::Mat& current, std::size_t level, const Eigen::Isometry3d& motion,
@@ -106,6 +109,7 @@ private:
   std::vector<Place> places_;                // apart from each other, newest last
   std::optional<OdometryScale> scale_;       // of the structure's unit
   std::optional<Last> last_;                 // where the scene was found last
+  bool odd_ = false;                         // the last sight contradicts the odometry of the places
   bool found_once_ = false;                  // in some image
   int missed_ = 0;                           // images in a row without the scene
 };
@@ -144,6 +148,50 @@ Eigen::Isometry3d SceneTracker::Impl::predict(const std::optional<Eigen::Isometr
   Eigen::Isometry3d moved = camera_in_odom->inverse() * *last_->camera_in_odom;
   moved.translation() *= scale_ ? 1.0 / scale_->metres : 0.0;
   return moved * last_->motion;
+}
+
+/** Whether the scene is seen elsewhere than odometry lets one expect by the place nearest to the camera. */
+bool SceneTracker::Impl::contradictsOdometry(const Eigen::Isometry3d& motion,
+                                             const Eigen::Isometry3d& camera_in_odom) const
+{
+  // Where the camera is mounted, and how long the unit is, is not exact.
+  constexpr double MOST_TURN = 0.04;  // [rad]
+  constexpr double MOST_WAY = 0.06;   // of the things' depth
+  constexpr double BY_WAY = 0.2;      // part of the way, or of the turn, since that place
+  const Place* nearest = nullptr;
+  Eigen::Isometry3d moved = Eigen::Isometry3d::Identity();  // from the place to the camera
+  for (const Place& place : places_)
+  {
+    if (!place.camera_in_odom)
+    {
+      continue;
+    }
+    const Eigen::Isometry3d from = camera_in_odom.inverse() * *place.camera_in_odom;
+    if (nearest == nullptr || from.translation().norm() < moved.translation().norm())
+    {
+      nearest = &place;
+      moved = from;
+    }
+  }
+  if (nearest == nullptr || !scale_)
+  {
+    return false;
+  }
+  moved.translation() /= scale_->metres;
+  const Eigen::Isometry3d expected = moved * nearest->frame.motion;
+  const double turn = rotationVector(expected.linear().transpose() * motion.linear()).norm();
+  const double way = (expected.translation() - motion.translation()).norm();
+  return turn > MOST_TURN + BY_WAY * rotationVector(moved.linear()).norm() ||
+         way > MOST_WAY * unitDepth() + BY_WAY * moved.translation().norm();
+}
+
+/** The scene has been moved, or odometry has jumped: what is known of the depths and of their unit stays true. */
+void SceneTracker::Impl::forgetOdometry()
+{
+  for (Place& place : places_)
+  {
+    place.camera_in_odom.reset();
+  }
 }
 
 /** Looks for every corner that a motion puts into the image, in one level. @param looked_for how many these are. */
@@ -269,7 +317,8 @@ Sight SceneTracker::Impl::look(const std::vector<cv::Mat>& pyramid, const Eigen:
 }
 
 /**
- * Keeps what was seen from a place that is away from all others, and learns the depths from all of them.
+ * Keeps what was seen from a place that is away from all others, or the first there with odometry, and learns the depths
+ * from all of them.
  * @return whether it is.
  */
 bool SceneTracker::Impl::remember(const Sight& sight, const std::optional<Eigen::Isometry3d>& camera_in_odom)
@@ -279,13 +328,16 @@ bool SceneTracker::Impl::remember(const Sight& sight, const std::optional<Eigen:
   const auto centre = [](const Eigen::Isometry3d& motion) -> Eigen::Vector3d {
     return motion.inverse().translation();
   };
-  for (const Place& place : places_)
+  const double apart = APART * unitDepth();
+  const auto is_here = [&](const Place& place) {
+    return (centre(place.frame.motion) - centre(sight.motion)).norm() < apart;
+  };
+  if (std::any_of(places_.begin(), places_.end(),
+                  [&](const Place& place) { return is_here(place) && (place.camera_in_odom || !camera_in_odom); }))
   {
-    if ((centre(place.frame.motion) - centre(sight.motion)).norm() < APART * unitDepth())
-    {
-      return false;
-    }
+    return false;
   }
+  places_.erase(std::remove_if(places_.begin(), places_.end(), is_here), places_.end());
   places_.push_back({ { sight.motion, sight.supporting }, camera_in_odom });
   if (places_.size() > MOST)
   {
@@ -314,7 +366,10 @@ bool SceneTracker::Impl::remember(const Sight& sight, const std::optional<Eigen:
     places_[i].frame.motion = frames[i].motion;
   }
   findSlopes(structure_, pixel());
-  scale_ = metresPerUnit();
+  if (const std::optional<OdometryScale> scale = metresPerUnit())
+  {
+    scale_ = scale;
+  }
   return true;
 }
 
@@ -411,7 +466,13 @@ PlaneTrack SceneTracker::Impl::add(const cv::Mat& image, const std::optional<Eig
   found_once_ = true;
   confirmed_ = true;
   last_ = Last{ sight.motion, sight.supporting, camera_in_odom };
-  if (remember(sight, camera_in_odom))
+  const bool odd = camera_in_odom && contradictsOdometry(sight.motion, *camera_in_odom);
+  if (odd && odd_)
+  {
+    forgetOdometry();
+  }
+  odd_ = odd && !odd_;
+  if (!odd_ && remember(sight, camera_in_odom))
   {
     last_->motion = fitMotion(structure_, sight.supporting, sight.motion);
   }

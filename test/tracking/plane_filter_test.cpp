@@ -221,6 +221,25 @@ TEST(PlaneFilter, TellsNoDistanceBeforeTheCameraHasMovedEnough)
   }
 }
 
+TEST(PlaneFilter, TellsTheDistanceEarlyWhereImagesAreExact)
+{
+  for (std::uint64_t seed = 1; seed <= 20; ++seed)
+  {
+    Approach approach(seed);
+    PlaneFilter filter{ PlaneFilterParams() };
+    const Eigen::Vector3d first = approach.cameraInOdom(0.6).translation();
+    double part = 0.6;
+    while ((approach.cameraInOdom(part).translation() - first).norm() < 0.5 * PlaneFilterParams().window)
+    {
+      part += 0.002;
+      approach.addTo(filter, part, 0.15);
+    }
+    const std::optional<double> distance = filter.estimate()->distance;
+    ASSERT_TRUE(distance) << seed;
+    EXPECT_NEAR(*distance, Approach::DISTANCE, 0.08 * Approach::DISTANCE) << seed;
+  }
+}
+
 TEST(PlaneFilter, KeepsItsPlaneWhereTheViewsAgree)
 {
   for (std::uint64_t seed = 1; seed <= 10; ++seed)
@@ -280,6 +299,52 @@ TEST(PlaneFilter, BeginsAnewWhenSomethingElseIsSeen)
     EXPECT_LT(angleBetween(filter.estimate()->motion.rotation, Eigen::Matrix3d::Identity()), 0.9 * DEGREE) << i;
     EXPECT_LT(filter.estimate()->motion.translation_over_distance.norm(), 0.01) << i;
   }
+}
+
+// One image comes without odometry, and when it is there again it counts from elsewhere.
+TEST(PlaneFilter, ForgetsOdometryThatHasBegunAnew)
+{
+  for (std::uint64_t seed = 1; seed <= 10; ++seed)
+  {
+    Approach approach(seed);
+    PlaneFilter filter{ PlaneFilterParams() };
+    const Eigen::Isometry3d elsewhere(Eigen::Translation3d(3.0, -1.0, 0.5));
+    for (int i = 0; i <= 80; ++i)
+    {
+      const double part = 0.01 * i;
+      const Eigen::Matrix3d h = approach.measure(part, 0.3);
+      if (i == 40)
+      {
+        filter.add(std::nullopt, h, FILTERED_K, approach.points());
+        continue;
+      }
+      const Eigen::Isometry3d camera = approach.cameraInOdom(part);
+      filter.add(i < 40 ? camera : elsewhere * camera, h, FILTERED_K, approach.points());
+      if (filter.estimate()->distance)
+      {
+        EXPECT_NEAR(*filter.estimate()->distance, Approach::DISTANCE, 0.15 * Approach::DISTANCE) << seed << ", " << i;
+      }
+    }
+    EXPECT_TRUE(filter.estimate()->distance) << seed;
+  }
+}
+
+// So near to the view noise makes the normal, and what it was taken for first is far from what it is.
+TEST(PlaneFilter, GivesUpANormalThatNothingAgreesWithLater)
+{
+  Approach approach(5);
+  PlaneFilter filter{ PlaneFilterParams() };
+  const Eigen::Vector3d wrong = Eigen::AngleAxisd(60.0 * DEGREE, Eigen::Vector3d::UnitX()) * approach.normal();
+  EuclideanHomography motion = approach.truth(0.9);
+  motion.translation_over_distance = Eigen::Vector3d(0.0, 0.0, 0.035);
+  motion.normal = wrong;
+  filter.add(approach.cameraInOdom(0.9), FILTERED_K * motion.matrix() * FILTERED_K.inverse(), FILTERED_K,
+             approach.points());
+  for (int i = 0; i <= 80; ++i)
+  {
+    approach.addTo(filter, 0.85 - 0.01 * i, 0.3);
+  }
+  EXPECT_GT(filter.estimate()->motion.normal.dot(approach.normal()), std::cos(5.0 * DEGREE));
 }
 
 TEST(PlaneFilter, LeavesOutASingleMeasurementThatContradictsTheOthers)

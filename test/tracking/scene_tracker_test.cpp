@@ -220,6 +220,36 @@ TEST_P(SceneTrackerTest, DoesWithoutOdometry)
   EXPECT_LT(tracker.track().plane->motion.translation_over_distance.norm(), 2e-4);
 }
 
+TEST_P(SceneTrackerTest, KeepsItsDepthsWhenTheSceneIsMoved)
+{
+  constexpr int MOVED_AT = STEPS_TO_GOAL / 2;
+  ViewedWorld scene(GetParam());
+  SceneTracker tracker = scene.tracker();
+  tracker.start(scene.find(scene.image(scene.onTheWay("far", 0.0))), scene.onTheWay("far", 0.0));
+  // The camera is where the scene is seen from, carried along with it.
+  const double way = (scene.onTheWay("far", 0.0).translation() - scene.world.goal.translation()).norm();
+  Eigen::Isometry3d carried(Eigen::AngleAxisd(0.1, Eigen::Vector3d(0.2, 0.3, 0.9).normalized()));
+  carried.translation() = Eigen::Vector3d(0.6, -0.3, 0.4) * way;
+  double before = 0.0;
+  for (int i = 0; i <= STEPS_TO_GOAL; ++i)
+  {
+    const Eigen::Isometry3d camera = scene.onTheWay("far", static_cast<double>(i) / STEPS_TO_GOAL);
+    const PlaneTrack& track =
+        tracker.add(scene.image(camera), i < MOVED_AT ? camera : Eigen::Isometry3d(carried * camera));
+    ASSERT_EQ(track.state, TrackingState::TRACKING) << i;
+    if (i == MOVED_AT - 1)
+    {
+      ASSERT_TRUE(track.plane->distance);
+      before = *track.plane->distance;
+    }
+    if (i >= MOVED_AT)
+    {
+      ASSERT_TRUE(track.plane->distance) << i;
+      EXPECT_NEAR(*track.plane->distance / before, 1.0, 0.02) << i;
+    }
+  }
+}
+
 TEST_P(SceneTrackerTest, IsNotMisledByWhatHidesAHalf)
 {
   ViewedWorld scene(GetParam());

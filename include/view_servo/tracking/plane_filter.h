@@ -141,6 +141,7 @@ private:
 
   PlaneFilterParams params_;
   std::vector<Track> tracks_;             // none, one or two; the likelier first
+  int others_ = 0;                        // measurements in a row whose normals are far from those of the tracks
   std::deque<Measurement> measurements_;  // of the window, newest last
   std::deque<Measurement> places_;        // apart from each other, also when the camera stands; newest last
   std::optional<Measurement> odd_;        // the last one, where it contradicts those
