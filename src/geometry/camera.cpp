@@ -13,6 +13,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <stdexcept>
 
 namespace view_servo
@@ -93,6 +94,40 @@ cv::Vec4d fisheyeCoefficients(const Camera& camera)
   return coefficients;
 }
 
+/**
+ * How far from the optical axis a ray may be, on the plane z = 1, before the image of what is farther out would lie farther
+ * in: no camera does so, only the polynomial does. Infinite where it never does. Tangential coefficients are left out.
+ */
+double farthestRay(const Camera& camera)
+{
+  constexpr double STEP = 0.25 * DEGREE;
+  constexpr double SIDEWAYS = 89.0 * DEGREE;
+  std::vector<double> d = camera.distortion;
+  d.resize(8, 0.0);
+  const cv::Vec4d fisheye = fisheyeCoefficients(camera);
+  const auto radius = [&](double angle) {
+    if (isFisheye(camera))
+    {
+      const double s = angle * angle;
+      return angle * (1.0 + s * (fisheye[0] + s * (fisheye[1] + s * (fisheye[2] + s * fisheye[3]))));
+    }
+    const double r = std::tan(angle);
+    const double s = r * r;
+    return r * (1.0 + s * (d[0] + s * (d[1] + s * d[4]))) / (1.0 + s * (d[5] + s * (d[6] + s * d[7])));
+  };
+  double last = 0.0;
+  for (double angle = STEP; angle < SIDEWAYS; angle += STEP)
+  {
+    const double next = radius(angle);
+    if (!(next > last))
+    {
+      return std::tan(angle - STEP);
+    }
+    last = next;
+  }
+  return std::numeric_limits<double>::infinity();
+}
+
 cv::Matx33d intrinsics(const Camera& camera)
 {
   cv::Matx33d k;
@@ -132,6 +167,10 @@ std::string Camera::fault() const
   {
     return "the focal lengths in K have to be positive";
   }
+  if (k.row(2) != Eigen::RowVector3d(0.0, 0.0, 1.0))
+  {
+    return "the last row of K has to be 0, 0, 1";
+  }
   if (width <= 0 || height <= 0)
   {
     return "width and height have to be positive";
@@ -144,6 +183,10 @@ std::string Camera::fault() const
   if (!projection.leftCols<3>().isZero(0.0) && !(projection(0, 0) > 0.0 && projection(1, 1) > 0.0))
   {
     return "the focal lengths in P have to be positive";
+  }
+  if (!projection.leftCols<3>().isZero(0.0) && projection.row(2).head<3>() != Eigen::RowVector3d(0.0, 0.0, 1.0))
+  {
+    return "the last row of P has to be 0, 0, 1, 0";
   }
   constexpr double ROUNDING = 1e-3;
   const Eigen::Matrix3d rotation = rectifyingRotation();
@@ -235,7 +278,16 @@ Points Camera::distorted(const Points& points) const
                    [](const Eigen::Vector2d& point) { return cv::Point3d(point.x(), point.y(), 1.0); });
     cv::projectPoints(rays, cv::Vec3d(), cv::Vec3d(), intrinsics(*this), distortion, pixels);
   }
-  return fromCv(pixels);
+  Points result = fromCv(pixels);
+  const double farthest = isPinhole() ? std::numeric_limits<double>::infinity() : farthestRay(*this);
+  for (std::size_t i = 0; i < points.size(); ++i)
+  {
+    if (!(points[i].norm() <= farthest))
+    {
+      result[i] = Eigen::Vector2d::Constant(NOT_A_NUMBER);
+    }
+  }
+  return result;
 }
 
 Eigen::Vector2d Camera::project(const Eigen::Vector3d& point) const

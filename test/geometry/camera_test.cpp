@@ -191,6 +191,12 @@ TEST(Camera, SaysWhichFieldCannotBeUsed)
   EXPECT_EQ(fault_of([&](Camera& c) { c.distortion[2] = nan; }), "a number in D is not finite");
   EXPECT_EQ(fault_of([](Camera& c) { c.rectification(0, 0) = 2.0; }), "R is no rotation");
   EXPECT_EQ(fault_of([](Camera& c) { c.projection(1, 1) = -3.0; }), "the focal lengths in P have to be positive");
+  EXPECT_EQ(fault_of([](Camera& c) { c.k(2, 2) = 0.0; }), "the last row of K has to be 0, 0, 1");
+  EXPECT_EQ(fault_of([](Camera& c) {
+              c.projection.leftCols<3>() = c.k;
+              c.projection(2, 2) = 0.0;
+            }),
+            "the last row of P has to be 0, 0, 1, 0");
   EXPECT_EQ(fault_of([](Camera& c) { c.height = 0; }), "width and height have to be positive");
   EXPECT_EQ(fault_of([](Camera& c) { c.distortion_model = "plumb\nbob"; }),
             "distortion_model 'plumb?bob' is not known: plumb_bob, rational_polynomial and equidistant are");
@@ -231,6 +237,26 @@ TEST(Camera, GivesNaNBeyondTheLargestImageOfABarrelDistortion)
   // r (1 - 0.4 r²) is at most 0.61: no ray meets a pixel farther than 317 px from the centre.
   EXPECT_TRUE(camera.normalized({ 318.5 + 340.0, 242.25 }).hasNaN());
   EXPECT_FALSE(camera.normalized({ 318.5 + 280.0, 242.25 }).hasNaN());
+}
+
+TEST(Camera, DoesNotFoldBackWhatIsFartherOut)
+{
+  for (const bool fisheye : { false, true })
+  {
+    Camera camera = pinhole();
+    camera.distortion_model = fisheye ? "equidistant" : "plumb_bob";
+    camera.distortion = { -0.4, 0.0, 0.0, 0.0 };
+    // r (1 - 0.4 r²) is largest at r = 0.913, where r is the tangent of the ray's angle, or the angle of a fisheye.
+    const double farthest = fisheye ? std::tan(0.913) : 0.913;
+    for (const double part : { 0.3, 0.9, 0.98 })
+    {
+      EXPECT_FALSE(camera.project({ 0.0, part * farthest, 1.0 }).hasNaN()) << part;
+    }
+    for (const double part : { 1.02, 1.4, 1.8, 5.0 })
+    {
+      EXPECT_TRUE(camera.project({ -part * farthest, 0.0, 1.0 }).hasNaN()) << part;
+    }
+  }
 }
 
 TEST(Camera, RefusesOtherModels)

@@ -152,6 +152,31 @@ TEST(CameraWarp, LeavesOutWhatTheOtherCameraDidNotSee)
   EXPECT_TRUE(CameraWarp(pinhole(), narrow).region({ 0, 0, 50, 50 }).empty());
 }
 
+TEST(CameraWarp, ShowsNothingTwiceWhereDistortionFoldsBack)
+{
+  Camera raw = pinhole();
+  raw.k(0, 0) = raw.k(1, 1) = 600.0;
+  raw.distortion_model = "plumb_bob";
+  raw.distortion = { -0.4, 0.0, 0.0, 0.0 };
+  Camera wide = pinhole();
+  wide.k(0, 0) = wide.k(1, 1) = 240.0;
+  const CameraWarp warp(raw, wide);
+  const cv::Mat image = warp.image(cv::Mat(480, 640, CV_8UC1, cv::Scalar(255)));
+  for (int v = 0; v < image.rows; ++v)
+  {
+    for (int u = 0; u < image.cols; ++u)
+    {
+      const Eigen::Vector2d ray = wide.normalized(Eigen::Vector2d(u, v));
+      // r (1 - 0.4 r²) is largest at r = 0.913.
+      if (ray.norm() > 0.95)
+      {
+        ASSERT_EQ(image.at<unsigned char>(v, u), 0) << u << ", " << v;
+      }
+    }
+  }
+  EXPECT_EQ(image.at<unsigned char>(240, 320), 255);
+}
+
 TEST(CameraWarp, RefusesWhatItCannotDo)
 {
   Camera camera = pinhole();

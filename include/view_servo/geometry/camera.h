@@ -63,7 +63,7 @@ struct Camera
 
   /**
    * Point (x, y) on the plane z = 1 of the optical frame -> pixel of the raw image, distortion applied. NaN when the
-   * camera is not calibrated. @throws std::invalid_argument for a distortion that fault() names.
+   * camera is not calibrated, and for rays so far out that the distortion folds back. @throws std::invalid_argument for a distortion that fault() names.
    */
   Points distorted(const Points& points) const;
 
