@@ -21,6 +21,7 @@ namespace mount
 namespace
 {
 constexpr int DISTANCE = SHARED - 1;  // index of the logarithm of the plane's distance among the unknowns
+constexpr int VIEW_HEIGHT = 7;        // of the view's height above the camera [m]
 
 /** The start that fits best, over the directions that the plane may have. @return false when there is none. */
 bool bestStart(const Problem& problem, const std::vector<PlanarPose>& odometry, const MountParams& params,
@@ -114,14 +115,16 @@ std::string fillHeight(const std::vector<HandEyePose>& poses, const Selection& s
       return "the view's plane is not the floor: it is inclined by " + hand_eye::rounded(DEGREES * incline) +
              " degrees; store a view of the floor, or tell the camera's height";
     }
-    height = result.distance - base_height;
-    result.covariance(2, 2) = result.distance_sigma * result.distance_sigma;
+    // The distance is that of the camera that took the view, which was as much higher as the images say.
+    height = result.distance - result.view_in_odom.translation().z() - base_height;
+    const Eigen::VectorXd with =
+        result.distance * selection.covariance.col(DISTANCE) - selection.covariance.col(VIEW_HEIGHT);
+    result.covariance(2, 2) = result.distance * with(DISTANCE) - with(VIEW_HEIGHT);
     constexpr int TO[] = { 0, 1, 3, 4, 5 };
     for (int row = 0; row < 5; ++row)
     {
-      const double with = result.distance * selection.covariance(row, DISTANCE);
-      result.covariance(TO[row], 2) = with;
-      result.covariance(2, TO[row]) = with;
+      result.covariance(TO[row], 2) = with(row);
+      result.covariance(2, TO[row]) = with(row);
     }
   }
   else if (std::isnan(height))

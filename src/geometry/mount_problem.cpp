@@ -39,12 +39,14 @@ Eigen::Vector3d legError(const Leg& leg, const PlanarPose& from, const PlanarPos
 {
   const PlanarPose motion = compose(inverse(from), to);
   const Eigen::Matrix2d half = Eigen::Rotation2Dd(-0.5 * motion.yaw).toRotationMatrix();
-  const Eigen::Matrix2d measured_half = Eigen::Rotation2Dd(-0.5 * leg.motion.yaw).toRotationMatrix();
+  // Half of a turn of 179 degrees and half of one of -179 are opposite: the measured one is counted as the other is.
+  const double turn_error = wrapAngle(motion.yaw - leg.motion.yaw);
+  const Eigen::Matrix2d measured_half = Eigen::Rotation2Dd(-0.5 * (motion.yaw - turn_error)).toRotationMatrix();
   const Eigen::Vector2d way(motion.x, motion.y);
   const Eigen::Vector2d place = half * way;
   Eigen::Vector3d error;
   error << (place - measured_half * Eigen::Vector2d(leg.motion.x, leg.motion.y)) / leg.way_sigma,
-      wrapAngle(motion.yaw - leg.motion.yaw) / leg.turn_sigma;
+      turn_error / leg.turn_sigma;
   if (by_from != nullptr && by_to != nullptr)
   {
     const Eigen::Vector2d turned(-place.y(), place.x());  // how the place moves when it turns to the left

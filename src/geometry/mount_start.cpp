@@ -3,6 +3,7 @@
 #include "mount_start.h"
 
 #include "decompositions.h"
+#include "view_servo/geometry/planar_pose.h"
 #include "view_servo/geometry/rotation_vector.h"
 
 #include <algorithm>
@@ -230,7 +231,7 @@ bool robustStart(const Problem& problem, const std::vector<PlanarPose>& odometry
     const Eigen::Vector3d way = level * (places[leg.from].linear().transpose() *
                                          (places[leg.to].translation() - places[leg.from].translation()));
     // The images tell the turn better than odometry; the way is kept in the frame half way through it.
-    const Eigen::Rotation2Dd correction(0.5 * (turn - leg.motion.yaw));
+    const Eigen::Rotation2Dd correction(0.5 * wrapAngle(turn - leg.motion.yaw));
     legs.push_back({ correction * Eigen::Vector2d(leg.motion.x, leg.motion.y), way.head<2>(),
                      Eigen::Rotation2Dd(turn).toRotationMatrix(), WORSE * leg.way_sigma });
   }
