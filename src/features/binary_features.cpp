@@ -8,6 +8,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstring>
+#include <numeric>
 #include <stdexcept>
 
 namespace view_servo
@@ -73,12 +74,26 @@ std::vector<BinaryFeature> detectBinaryFeatures(const cv::Mat& grey, const cv::R
   std::vector<cv::KeyPoint> corners;
   cv::Mat bits;
   orb->detectAndCompute(image, cv::noArray(), corners, bits);
-  std::vector<BinaryFeature> features(static_cast<std::size_t>(bits.rows));
-  for (std::size_t i = 0; i < features.size(); ++i)
+  // Of corners that are alike OpenCV keeps all, however many they are.
+  std::vector<int> strongest(static_cast<std::size_t>(bits.rows));
+  std::iota(strongest.begin(), strongest.end(), 0);
+  if (bits.rows > params.max_features)
   {
-    BinaryFeature& feature = features[i];
-    std::memcpy(feature.word.data(), bits.ptr(static_cast<int>(i)), sizeof(BinaryWord));
-    feature.angle = static_cast<std::uint8_t>(std::lround(corners[i].angle * 256.0F / 360.0F) % 256);
+    std::stable_sort(strongest.begin(), strongest.end(), [&](int a, int b) {
+      return corners[static_cast<std::size_t>(a)].response > corners[static_cast<std::size_t>(b)].response;
+    });
+    strongest.resize(static_cast<std::size_t>(params.max_features));
+    std::sort(strongest.begin(), strongest.end());
+  }
+  std::vector<BinaryFeature> features;
+  features.reserve(strongest.size());
+  for (const int i : strongest)
+  {
+    BinaryFeature feature;
+    std::memcpy(feature.word.data(), bits.ptr(i), sizeof(BinaryWord));
+    const float angle = corners[static_cast<std::size_t>(i)].angle;
+    feature.angle = static_cast<std::uint8_t>(std::lround(angle * 256.0F / 360.0F) % 256);
+    features.push_back(feature);
   }
   return features;
 }

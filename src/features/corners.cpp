@@ -8,6 +8,7 @@
 #include <algorithm>
 #include <cmath>
 #include <stdexcept>
+#include <cstdint>
 
 namespace view_servo
 {
@@ -52,8 +53,11 @@ cv::Mat harrisResponse(const cv::Mat& image, const CornerParams& params)
   cv::parallel_for_(cv::Range(0, stripes), [&](const cv::Range& range) {
     for (int stripe = range.start; stripe < range.end; ++stripe)
     {
-      const int first = image.rows * stripe / stripes;
-      const int last = image.rows * (stripe + 1) / stripes;
+      const auto begin_of = [&](std::int64_t number) {
+        return static_cast<int>(image.rows * number / stripes);
+      };
+      const int first = begin_of(stripe);
+      const int last = begin_of(stripe + 1);
       const int top = std::max(0, first - reach);
       const int bottom = std::min(image.rows, last + reach);
       const cv::Mat part = image.rowRange(top, bottom);
@@ -173,7 +177,7 @@ std::vector<Parameter> parameters(CornerParams& params)
 {
   return {
     integer("max_corners", params.max_corners, "", "[1, 5000]", "corners kept in each image, strongest first"),
-    real("derivative_sigma", params.derivative_sigma, "px", "(0, 20]", "scale of the Harris detector's derivatives"),
+    real("derivative_sigma", params.derivative_sigma, "px", "[0.3, 20]", "scale of the Harris detector's derivatives"),
     real("integration_sigma", params.integration_sigma, "px", "(0, 20]", "scale of the Harris detector's window"),
     real("harris_k", params.k, "", "[0, 0.25)", "k in R = det(M) - k tr(M)^2"),
     real("corner_distance", params.min_distance, "px", "[0, 1000]", "smallest distance between corners"),

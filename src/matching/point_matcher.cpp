@@ -109,7 +109,7 @@ std::vector<std::size_t> strongestEntries(const std::vector<float>& matrix, std:
     }
     return places;
   }
-  const auto most = static_cast<std::size_t>(count);
+  const std::size_t most = std::min(static_cast<std::size_t>(count), std::max(rows, columns));
   std::vector<Entry> of_row(most);
   std::vector<Entry> of_columns(columns * most);
   std::vector<float> least_of_columns(columns, 0.0F);  // of those of a column

@@ -111,7 +111,7 @@ private:
       const double w = h(2, 0) * from[i].x() + h(2, 1) * from[i].y() + h(2, 2);
       to[i] = Eigen::Vector2d(h(0, 0) * from[i].x() + h(0, 1) * from[i].y() + h(0, 2),
                               h(1, 0) * from[i].x() + h(1, 1) * from[i].y() + h(1, 2)) /
-              w;
+              (w > 0.0 ? w : std::numeric_limits<double>::quiet_NaN());
     }
   }
 

@@ -55,6 +55,21 @@ TEST(BinaryFeatures, AreTheSameForTheSameImage)
   }
 }
 
+TEST(BinaryFeatures, AreNoMoreThanAskedForWhereAllAreAlike)
+{
+  cv::Mat image(480, 480, CV_8UC1, cv::Scalar(60));
+  constexpr int PERIOD = 16;
+  for (int v = 0; v + PERIOD <= image.rows; v += PERIOD)
+  {
+    for (int u = 0; u + PERIOD <= image.cols; u += PERIOD)
+    {
+      image(cv::Rect(u + 4, v + 4, PERIOD / 2, PERIOD / 2)) = 200;
+    }
+  }
+  const Features features = detect(image);
+  EXPECT_EQ(features.size(), static_cast<std::size_t>(BinaryFeatureParams().max_features));
+}
+
 TEST(BinaryFeatures, StayInOtherLightAndSizeAndTurnWithTheImage)
 {
   const cv::Mat image = texturedPicture(1, cv::Size(640, 480));

@@ -102,6 +102,14 @@ TEST_F(PointMatcherTest, MatchesInAllVariants)
   }
 }
 
+TEST_F(PointMatcherTest, TakesNoMoreEntriesThanThereAre)
+{
+  params_.cyclic_entries = 0;  // all
+  const double all = correct(picture_, warped_, exampleHomography());
+  params_.cyclic_entries = 2147483647;
+  EXPECT_EQ(correct(picture_, warped_, exampleHomography()), all);
+}
+
 TEST_F(PointMatcherTest, AVoteWeighsOneOverTheNumberOfSimilarProfiles)
 {
   params_.cyclic_order = false;

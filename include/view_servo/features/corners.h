@@ -21,7 +21,7 @@ struct CornerParams
   double k = 0.04;                  ///< weight of the trace in the Harris measure R = det(M) - k tr(M)²
   double min_distance = 2.0;        ///< no two corners closer than this [px]
   double relative_threshold = 0.0;  ///< least response of a corner that is kept, as a fraction of the strongest, [0, 1)
-  int border = 4;                   ///< no corners closer than this to the image's border [px]
+  int border = 4;                   ///< no corners nearer to the image's border, to the pixel [px]
 
   /** Each fault in one line, those of nested parameters included; empty when the parameters are usable. */
   std::vector<std::string> validate() const;

@@ -122,7 +122,7 @@ std::vector<std::string> missingMotion(const HandEyeMotion& motion, const HandEy
  * weighs as it should. Poses that contradict most others are left out. With `finds_focal_length` a factor of the focal
  * lengths is one more unknown, and residuals are those of the camera matrix with it.
  *
- * Does the same for poses in another order. Nothing is found when motion is lacking, when fewer than half of the poses
+ * Nothing is found when motion is lacking, when fewer than half of the poses
  * agree, or when the result is less certain than asked for.
  * @throws std::invalid_argument when the view has not four corners in general position, the camera matrix is none, a
  * number is not finite, a flange's rotation is none or a known distance is not above 0.

@@ -38,7 +38,7 @@ std::vector<Parameter> parameters(LineFeatureParams& params);
  * beside them, and their groups. Computed once for a stored view. Safe to use from several threads.
  *
  * Segments are kept longest first; input() says which one of those given it was. Memory is bounded by segments x
- * neighbours, and the groups by max_grouped x neighbours² / 2.
+ * neighbours, and the groups by max_grouped x groups.max_neighbours² / 2, where that is not 0.
  */
 class LineFeatures
 {
