@@ -2,13 +2,14 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "view_servo/features/corners.h"
 
-#include <opencv2/core/hal/intrin.hpp>
+#include "view_servo/images/universal_intrinsics.h"
+
 #include <opencv2/imgproc.hpp>
 
 #include <algorithm>
 #include <cmath>
-#include <stdexcept>
 #include <cstdint>
+#include <stdexcept>
 
 namespace view_servo
 {

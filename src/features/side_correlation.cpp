@@ -4,9 +4,9 @@
 
 #include "view_servo/geometry/line_homography.h"
 #include "view_servo/images/sampling.h"
+#include "view_servo/images/universal_intrinsics.h"
 
 #include <Eigen/Geometry>
-#include <opencv2/core/hal/intrin.hpp>
 
 #include <algorithm>
 #include <cmath>

@@ -2,8 +2,9 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "view_servo/images/sampling.h"
 
+#include "view_servo/images/universal_intrinsics.h"
+
 #include <Eigen/Geometry>
-#include <opencv2/core/hal/intrin.hpp>
 
 #include <cstdint>
 

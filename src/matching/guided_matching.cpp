@@ -5,11 +5,11 @@
 #include "view_servo/geometry/fundamental.h"
 #include "view_servo/geometry/homography.h"
 #include "view_servo/images/sampling.h"
+#include "view_servo/images/universal_intrinsics.h"
 
 #include <Eigen/Geometry>
 #include <Eigen/LU>
 #include <opencv2/core.hpp>
-#include <opencv2/core/hal/intrin.hpp>
 
 #include <algorithm>
 #include <cmath>
