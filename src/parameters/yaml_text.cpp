@@ -6,9 +6,11 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <cstdio>
 #include <filesystem>
 #include <fstream>
 #include <iterator>
+#include <limits>
 #include <stdexcept>
 #include <system_error>
 
@@ -80,6 +82,13 @@ YAML::Node loadSmallYamlFile(const std::string& path)
     throw std::runtime_error("it cannot be read");
   }
   return parseYaml(text);
+}
+
+std::string exactText(double number)
+{
+  char text[40];
+  std::snprintf(text, sizeof(text), "%.*g", std::numeric_limits<double>::max_digits10, number);
+  return text;
 }
 
 }  // namespace view_servo

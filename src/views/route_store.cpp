@@ -12,7 +12,6 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
-#include <limits>
 #include <optional>
 #include <set>
 #include <utility>
@@ -90,7 +89,6 @@ void check(const Route& route)
 std::string toText(const Route& route)
 {
   YAML::Emitter yaml;
-  yaml.SetDoublePrecision(std::numeric_limits<double>::max_digits10);
   yaml << YAML::BeginMap;
   yaml << YAML::Key << "format" << YAML::Value << FORMAT;
   yaml << YAML::Key << "frame" << YAML::Value << route.frame;
@@ -99,8 +97,9 @@ std::string toText(const Route& route)
   for (const RouteStop& stop : route.stops)
   {
     yaml << YAML::Flow << YAML::BeginMap << YAML::Key << "view" << YAML::Value << stop.view << YAML::Key << "base"
-         << YAML::Value << YAML::Flow << std::vector<double>{ stop.base.x, stop.base.y, stop.base.yaw } << YAML::Key
-         << "stamp" << YAML::Value << stop.stamp << YAML::EndMap;
+         << YAML::Value << YAML::Flow
+         << std::vector<std::string>{ exactText(stop.base.x), exactText(stop.base.y), exactText(stop.base.yaw) }
+         << YAML::Key << "stamp" << YAML::Value << exactText(stop.stamp) << YAML::EndMap;
   }
   yaml << YAML::EndSeq << YAML::EndMap << YAML::Newline;
   return withChecksum(std::string(yaml.c_str(), yaml.size()));

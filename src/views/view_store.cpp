@@ -15,7 +15,6 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
-#include <limits>
 #include <stdexcept>
 #include <string>
 #include <string_view>
@@ -147,14 +146,14 @@ void check(const StoredView& view)
 
 /** Row-major, as sensor_msgs/CameraInfo has them. */
 template <typename Matrix>
-std::vector<double> toList(const Matrix& matrix)
+std::vector<std::string> toList(const Matrix& matrix)
 {
-  std::vector<double> list;
+  std::vector<std::string> list;
   for (Eigen::Index row = 0; row < matrix.rows(); ++row)
   {
     for (Eigen::Index column = 0; column < matrix.cols(); ++column)
     {
-      list.push_back(matrix(row, column));
+      list.push_back(exactText(matrix(row, column)));
     }
   }
   return list;
@@ -172,7 +171,9 @@ void emit(YAML::Emitter& yaml, const Camera& camera)
   emit(yaml, "width", camera.width);
   emit(yaml, "height", camera.height);
   emit(yaml, "distortion_model", camera.distortion_model);
-  emit(yaml, "D", camera.distortion);
+  emit(yaml, "D",
+       toList(Eigen::Map<const Eigen::VectorXd>(camera.distortion.data(),
+                                                static_cast<Eigen::Index>(camera.distortion.size()))));
   emit(yaml, "K", toList(camera.k));
   emit(yaml, "R", toList(camera.rectification));
   emit(yaml, "P", toList(camera.projection));
@@ -203,11 +204,10 @@ std::string toYamlText(const StoredView& view, const std::string& image_file)
   const cv::Rect& region = view.region;
   YAML::Emitter yaml;
   yaml.SetSeqFormat(YAML::Flow);
-  yaml.SetDoublePrecision(std::numeric_limits<double>::max_digits10);
   yaml << YAML::BeginMap;
   emit(yaml, "format", FORMAT);
   emit(yaml, "image", image_file);
-  emit(yaml, "stamp", view.stamp);
+  emit(yaml, "stamp", exactText(view.stamp));
   emit(yaml, "frame_id", view.frame_id);
   emit(yaml, "region", std::vector<int>{ region.x, region.y, region.width, region.height });
   yaml << YAML::Comment("x, y, width, height");

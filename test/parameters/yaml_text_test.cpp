@@ -10,6 +10,7 @@
 #include <exception>
 #include <stdexcept>
 #include <string>
+#include <vector>
 
 namespace view_servo
 {
@@ -20,6 +21,16 @@ TEST(YamlText, IsRead)
   EXPECT_EQ(parseYaml("{a: {b: 1}, c: [2, 3]}")["c"][1].as<int>(), 3);
   EXPECT_EQ(parseYaml("a: 1\n\n")["a"].as<int>(), 1);
   EXPECT_TRUE(parseYaml("").IsNull());
+}
+
+TEST(YamlText, NumbersAreReadAsTheyWereWritten)
+{
+  for (const double number : { 1.7e9 + 1.0 / 3.0, -1.0 / 3.0, 1e-300, 5e-324, 1.7976931348623157e308, 0.0, -0.1 })
+  {
+    YAML::Emitter yaml;
+    yaml << YAML::Flow << std::vector<std::string>{ exactText(number), "1" };
+    EXPECT_EQ(parseYaml(yaml.c_str())[0].as<double>(), number) << yaml.c_str();
+  }
 }
 
 TEST(YamlText, IsRefusedWhereItEndsTooEarly)

@@ -28,4 +28,10 @@ YAML::Node parseYaml(const std::string& text);
  */
 YAML::Node loadSmallYamlFile(const std::string& path);
 
+/**
+ * A finite number as a plain scalar that is read as this number, to the last bit. yaml-cpp before 0.6.3 itself writes 16
+ * digits at most.
+ */
+std::string exactText(double number);
+
 }  // namespace view_servo
