@@ -25,6 +25,7 @@
 #include <opencv2/imgproc.hpp>
 
 #include <algorithm>
+#include <atomic>
 #include <cmath>
 #include <exception>
 #include <map>
@@ -312,9 +313,9 @@ public:
         const std::lock_guard<std::mutex> lock(mutex_);
         connections_ = connections;
       }
+      connections->spinner.start();
       subscribe(nh, names_.camera_topic, connections->camera, &RobotSnapshot::camera);
       showOverlay(overlay_wanted_);
-      connections->spinner.start();
     }
     catch (const std::exception& error)
     {
@@ -393,6 +394,16 @@ public:
     data_.views_fault.clear();
     data_.views = std::move(views);
     data_.views_count += is_new ? 1 : 0;
+  }
+
+  /** How long looking for topics and views took last [s]. */
+  double lookTime() const
+  {
+    return look_time_;
+  }
+  void setLookTime(double time)
+  {
+    look_time_ = time;
   }
 
   void lookForTopics()
@@ -580,6 +591,10 @@ private:
       return;
     }
     std::string transport = "raw";
+    if (place == &RobotSnapshot::camera)
+    {
+      ros::NodeHandle("~").getParam("image_transport", transport);
+    }
     if (endsWith(topic, COMPRESSED))
     {
       topic.resize(topic.size() - COMPRESSED.size());
@@ -587,14 +602,25 @@ private:
     }
     {
       const std::lock_guard<std::mutex> lock(mutex_);
-      (data_.*place).since = Clock::now();
-      (data_.*place).topic = nh.resolveName(topic);
+      TopicPicture& last = data_.*place;
+      last.since = Clock::now();
+      last.topic = topic;
+      last.picture.release();  // what was shown before is not what is seen now
+      last.fault.clear();
     }
-    subscriber.registerCallback(boost::function<void(const CameraImageConstPtr&)>(
-        [this, place](const CameraImageConstPtr& image) { takeImage(*image, place); }));
-    subscriber.subscribe(nh, ros::NodeHandle("~"), topic, transport, 1);
-    const std::lock_guard<std::mutex> lock(mutex_);
-    (data_.*place).topic = subscriber.getTopic();
+    try
+    {
+      subscriber.registerCallback(boost::function<void(const CameraImageConstPtr&)>(
+          [this, place](const CameraImageConstPtr& image) { takeImage(*image, place); }));
+      subscriber.subscribe(nh, ros::NodeHandle("~"), topic, transport, 1);
+      const std::lock_guard<std::mutex> lock(mutex_);
+      (data_.*place).topic = subscriber.getTopic();
+    }
+    catch (const std::exception& error)
+    {
+      const std::lock_guard<std::mutex> lock(mutex_);
+      (data_.*place).fault = oneLine(error);
+    }
   }
 
   // ------------------------------------------------------------------------------------------------- the callbacks
@@ -671,7 +697,10 @@ private:
       }
       for (std::size_t k = 0; k < KINDS.size(); ++k)
       {
-        if (nodes_[k].empty() || status.name != nodes_[k].substr(1) + ": " + KINDS[k].action)
+        // A nodelet's are named by itself, but its action is its manager's; see setGate().
+        const std::string usual = resolved(KINDS[k].name);
+        if (nodes_[k].empty() || (status.name != nodes_[k].substr(1) + ": " + KINDS[k].action &&
+                                  status.name != usual.substr(1) + ": " + KINDS[k].action))
         {
           continue;
         }
@@ -718,6 +747,7 @@ private:
   }
 
   const RobotNames names_;
+  std::atomic<double> look_time_{ 0.0 };  // [s]
   mutable std::mutex mutex_;
   RobotSnapshot data_;
   std::array<std::string, DRIVERS> nodes_;  // absolute names of those that serve the actions; empty: not known yet
@@ -765,13 +795,24 @@ RobotSnapshot RobotLink::snapshot()
   for (TaskWorker& gate : gates_)
   {
     gate.expire();
+    const std::string waiting = gate.waitsForMaster(GATE_PATIENCE);
+    if (!waiting.empty())
+    {
+      core_->say("The master does not answer, so that " + waiting +
+                     " cannot be called; use the robot's emergency stop unless it stands",
+                 false);
+    }
   }
   if (Clock::now() >= next_look_ && views_.isIdle())
   {
-    next_look_ = Clock::now() + std::chrono::milliseconds(static_cast<int>(1000 * LOOK_PERIOD));
+    // Many views take view_store long to list: it is no more than a tenth of the time busy with that.
+    next_look_ = Clock::now() +
+                 std::chrono::milliseconds(static_cast<int>(1000 * std::max(LOOK_PERIOD, 10 * core_->lookTime())));
     views_.add(task([](Core& core, ServiceCaller& caller) {
+      const Clock::time_point begin = Clock::now();
       core.lookForTopics();
       core.lookForViews(caller, false);
+      core.setLookTime(secondsSince(begin));
     }));
   }
   return core_->snapshot();
@@ -817,7 +858,7 @@ void RobotLink::stop()
   const std::vector<std::size_t> present = core_->present();
   core_->say(present.empty() ? "Stop: no driver is known" + core_->place() +
                                    "; goals and gates are ended all the same where there are any"
-                             : "Stop: all goals are cancelled, the gate is being closed",
+                             : "Stop: all goals are told to end, the gates are being closed",
              published && !present.empty());
   for (std::size_t k = 0; k < gates_.size(); ++k)
   {

@@ -42,6 +42,8 @@ struct TaskQueue
   std::condition_variable changed;
   std::deque<TaskWorker::Task> tasks;
   std::optional<RunningCall> call;
+  std::string looked_up;  // service that the master is asked for; empty: none
+  Clock::time_point looked_up_since;
   unsigned generation = 0;  // calls of tasks that began in an earlier one are given up
   bool is_running = false;
   bool is_finishing = false;
@@ -85,9 +87,17 @@ struct TaskQueue
   }
 };
 
+void ServiceCaller::lookUp(const std::string& name)
+{
+  const std::lock_guard<std::mutex> lock(queue_.mutex);
+  queue_.looked_up = name;
+  queue_.looked_up_since = Clock::now();
+}
+
 bool ServiceCaller::begin(const ros::ServiceClient& client, double patience)
 {
   const std::lock_guard<std::mutex> lock(queue_.mutex);
+  queue_.looked_up.clear();
   if (queue_.generation != generation_)
   {
     return false;
@@ -187,6 +197,13 @@ void TaskWorker::expire()
   {
     ended->shutdown();  // its call() returns
   }
+}
+
+std::string TaskWorker::waitsForMaster(double patience) const
+{
+  const std::lock_guard<std::mutex> lock(queue_->mutex);
+  const bool is_late = std::chrono::duration<double>(Clock::now() - queue_->looked_up_since).count() > patience;
+  return is_late ? queue_->looked_up : "";
 }
 
 bool TaskWorker::isIdle() const

@@ -43,9 +43,11 @@ public:
   CallOutcome call(const std::string& name, Service& service, double patience)
   {
     constexpr bool PERSISTENT = true;  // see callService(); and it is connected here, not by call()
+    lookUp(name);
     ros::ServiceClient client = ros::NodeHandle().serviceClient<Service>(name, PERSISTENT);
     if (!client.isValid())
     {
+      lookUp("");
       return { CallOutcome::NO_SERVICE, "there is no service " + name };
     }
     if (!begin(client, patience))
@@ -57,6 +59,8 @@ public:
   }
 
 private:
+  /** Says which service is asked for at the master, which may take as long as it likes. @param name empty: none is. */
+  void lookUp(const std::string& name);
   /** Lets expire() end the call; false when it must not begin, as room has to be made. */
   bool begin(const ros::ServiceClient& client, double patience);
   /** Says how a call ended. */
@@ -92,6 +96,8 @@ public:
   void expire();
   /** Whether nothing runs or waits. */
   bool isIdle() const;
+  /** The service that the master has been asked for, for longer than a time [s]; empty: none. No such call can be ended. */
+  std::string waitsForMaster(double patience) const;
 
 private:
   std::shared_ptr<TaskQueue> queue_;  // shared with the thread, which may outlive this object

@@ -86,7 +86,7 @@ NOT_FOR_USERS = {
         r"no driver",
         r".* is asked to drive to .*",
         r"Stop: .*, its goals are cancelled",
-        r"Stop: all goals are cancelled, the gate is being closed",
+        r"Stop: all goals are told to end, the gates are being closed",
     ],
     "it is a label, style or key of rviz's panel": [
         r"to go:",
