@@ -52,6 +52,11 @@ Finding judgeTf(const MountObservations& mount, bool is_arm)
         is_arm ? "publish the arm's tf (robot_state_publisher) and the camera's place in the hand, or set odom_frame:="
                : "publish where the camera is on the base (static_transform_publisher), or set base_frame:=");
   }
+  if (mount.is_static && is_arm)
+  {
+    return error(name, between(mount) + " is static: by tf the camera does not move when the arm does",
+                 "let the hand-eye calibration's parent be the flange, or set odom_frame:= to the arm's base");
+  }
   if (mount.is_static)
   {
     return ok(name, between(mount) + ", static");

@@ -95,6 +95,7 @@ struct JointObservations
 {
   StreamObservations stream;
   bool described = false;            ///< there is a robot_description with joints that move
+  bool is_other = false;             ///< the URDF has none of the messages' joints
   std::vector<std::string> unknown;  ///< joints of the messages that the URDF does not have
   std::vector<std::string> silent;   ///< joints of the URDF that no message has
   std::string fault;                 ///< which position lies beyond the URDF's limits

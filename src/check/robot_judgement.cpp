@@ -175,10 +175,11 @@ Findings judgeJoints(const JointObservations& joints)
     return { warning(name, found + ", but robot_description has no joints that move",
                      "load the arm's URDF into robot_description; without it servo_25d watches no joint limits") };
   }
-  if (!joints.unknown.empty())
+  const std::string unknown =
+      "robot_description has no joints " + firstFew(joints.unknown) + ", of '" + stream.topic + "'";
+  if (joints.is_other)
   {
-    return { error(name, "robot_description has no joints " + firstFew(joints.unknown) + ", of '" + stream.topic + "'",
-                   "load the URDF of this arm, or say joint_states:= as its own topic is named") };
+    return { error(name, unknown, "load the URDF of this arm, or say joint_states:= as its own topic is named") };
   }
   if (!joints.fault.empty())
   {
@@ -189,6 +190,10 @@ Findings judgeJoints(const JointObservations& joints)
   {
     return { warning(name, found + ", without " + firstFew(joints.silent) + " of robot_description",
                      "publish their states, too, else nobody watches their limits") };
+  }
+  if (!joints.unknown.empty())
+  {
+    return { warning(name, unknown, "nothing, unless one of them moves the camera: nobody watches their limits") };
   }
   return { ok(name, found + ", all joints of robot_description, within their limits") };
 }

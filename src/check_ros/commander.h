@@ -55,9 +55,9 @@ private:
   const bool is_arm_;
   const std::string camera_frame_;
   ros::Publisher publisher_;
-  ros::Subscriber subscriber_;
-  mutable std::mutex mutex_;
+  mutable std::mutex mutex_;  // guards rival_
   std::string rival_;
+  ros::Subscriber subscriber_;  // ends first
 };
 
 }  // namespace view_servo::check

@@ -8,13 +8,14 @@
 
 #include <ros/time.h>
 
+#include <algorithm>
 #include <chrono>
 #include <thread>
 
 namespace view_servo::check
 {
 RobotCheck::RobotCheck(const ros::NodeHandle& nh, const Setup& setup)
-  : nh_(nh), setup_(setup), begin_(steadySeconds()), ros_begin_(ros::Time::now().toSec()), camera_(nh, setup)
+  : nh_(nh), setup_(setup), begin_(steadySeconds()), camera_(nh, setup)
 {
   if (setup.is_arm)
   {
@@ -25,7 +26,7 @@ RobotCheck::RobotCheck(const ros::NodeHandle& nh, const Setup& setup)
   odometry_ = std::make_unique<OdometryListener>(nh, setup, transforms_, camera_, delay);
 }
 
-void RobotCheck::listen(double duration, const std::function<bool()>& given_up)
+void RobotCheck::wait(double duration, const std::function<bool()>& given_up)
 {
   const std::chrono::milliseconds poll(10);
   const double end = steadySeconds() + duration;
@@ -35,11 +36,24 @@ void RobotCheck::listen(double duration, const std::function<bool()>& given_up)
   }
 }
 
+void RobotCheck::listen(double duration, const std::function<bool()>& given_up)
+{
+  wait(duration, [&] {
+    if (const ros::Time now = ros::Time::now(); !clock_begin_ && !now.isZero())
+    {
+      clock_begin_ = ClockReading{ steadySeconds(), now.toSec() };
+    }
+    return given_up();
+  });
+}
+
 MachineObservations RobotCheck::observeMachine() const
 {
   MachineObservations machine;
   machine.sim_time = ros::Time::isSimTime();
-  machine.clock_rate = (ros::Time::now().toSec() - ros_begin_) / (steadySeconds() - begin_);
+  machine.clock_rate = clock_begin_ ? (ros::Time::now().toSec() - clock_begin_->ros) /
+                                          std::max(steadySeconds() - clock_begin_->steady, 1e-3)
+                                    : 0.0;
   machine.cores = ProcessorMeter::cores();
   machine.cores_idle = processor_.idleCores();
   const std::filesystem::path directory = viewsDir(setup_.views_dir);

@@ -14,6 +14,7 @@
 
 #include <functional>
 #include <memory>
+#include <optional>
 #include <string>
 
 namespace view_servo::check
@@ -31,7 +32,10 @@ public:
    * Waits, by a steady clock. @param duration [s]. @param given_up asked every few milliseconds; once it is true, the
    * wait ends.
    */
-  static void listen(double duration, const std::function<bool()>& given_up);
+  static void wait(double duration, const std::function<bool()>& given_up);
+
+  /** Waits as wait() does, while messages come. */
+  void listen(double duration, const std::function<bool()>& given_up);
 
   /** What is right or wrong, by what came until now. */
   Findings findings() const;
@@ -62,12 +66,18 @@ public:
   }
 
 private:
+  struct ClockReading
+  {
+    double steady;  // time by a steady clock [s]
+    double ros;     // time by ROS' clock [s]
+  };
+
   MachineObservations observeMachine() const;
 
   const ros::NodeHandle nh_;
   const Setup setup_;
-  const double begin_;      // time of the construction by a steady clock [s]
-  const double ros_begin_;  // time of the construction by ROS' clock [s]
+  const double begin_;                       // time of the construction by a steady clock [s]
+  std::optional<ClockReading> clock_begin_;  // the first that listen() made; simulated time is zero until /clock comes
   ProcessorMeter processor_;
   TransformSource transforms_;
   CameraListener camera_;

@@ -145,6 +145,7 @@ std::string OdometryListener::adviceOn(double remaining)
 JointListener::JointListener(const ros::NodeHandle& nh, const Setup& setup)
   : topic_(nh.resolveName(setup.joint_states)),
     described_(movableJoints(robotDescription(nh))),
+    following_(mimicJoints(robotDescription(nh))),
     guard_(jointLimits(robotDescription(nh)), 0.0, 1.0)
 {
   subscriber_ = listen<sensor_msgs::JointState>(nh, topic_, [this](const sensor_msgs::JointState& m) { onJoints(m); });
@@ -167,8 +168,10 @@ JointObservations JointListener::observations(const RosGraph& graph) const
   meter_.fill(joints.stream);
   joints.described = !described_.empty();
   joints.fault = fault_;
-  std::set_difference(names_.begin(), names_.end(), described_.begin(), described_.end(),
-                      std::back_inserter(joints.unknown));
+  std::set<std::string> known = described_;
+  known.insert(following_.begin(), following_.end());
+  std::set_difference(names_.begin(), names_.end(), known.begin(), known.end(), std::back_inserter(joints.unknown));
+  joints.is_other = !names_.empty() && joints.unknown.size() == names_.size();
   std::set_difference(described_.begin(), described_.end(), names_.begin(), names_.end(),
                       std::back_inserter(joints.silent));
   return joints;
@@ -245,9 +248,11 @@ CommandObservations observeCommands(const ros::NodeHandle& nh, const Setup& setu
   commands.dry_run = setup.dry_run;
   commands.listeners = graph.subscribers(commands.topic);
   const std::string driver = nh.resolveName(setup.is_arm ? "servo_25d" : "homing");
+  const std::string result = nh.resolveName(setup.is_arm ? "servo/result" : "home/result");
+  const std::string server = graph.publisher(result);  // the driver by another name, or the manager of its nodelet
   for (const std::string& node : graph.publishers(commands.topic))
   {
-    if (node != driver)
+    if (node != driver && node != server)
     {
       commands.publishers.push_back(node);
     }

@@ -87,7 +87,8 @@ private:
   void onJoints(const sensor_msgs::JointState& message);
 
   const std::string topic_;
-  const std::set<std::string> described_;  // movable joints of robot_description
+  const std::set<std::string> described_;  // joints of robot_description that move by themselves
+  const std::set<std::string> following_;  // those that mimic others, whose states may come or not
   mutable std::mutex mutex_;               // guards what follows
   JointGuard guard_;
   StreamMeter meter_;

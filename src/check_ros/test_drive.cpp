@@ -109,7 +109,7 @@ std::string TestDrive::look(Place& place)
 {
   constexpr double SETTLED = 0.3;   // more than images take to come [s]
   constexpr double PATIENCE = 4.0;  // [s]
-  RobotCheck::listen(SETTLED, given_up_);
+  RobotCheck::wait(SETTLED, given_up_);
   const std::optional<CameraFrame> before = robot_.camera().frame();
   std::optional<CameraFrame> frame;  // the first from now on: what belongs to later ones may always be late
   return waitUntilReady(

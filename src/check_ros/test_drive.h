@@ -32,7 +32,7 @@ public:
   /** Says something to the user, and waits until he has done so; false: he does not want to go on. */
   using Prompt = std::function<bool(const std::string& text)>;
 
-  /** @param given_up as in RobotCheck::listen(). `robot` must outlive the drive. */
+  /** @param given_up as in RobotCheck::wait(). `robot` must outlive the drive. */
   TestDrive(const RobotCheck& robot, const DriveParams& params, std::function<bool()> given_up);
 
   /**

@@ -165,7 +165,10 @@ std::string robotDescription(const ros::NodeHandle& nh)
   return text;
 }
 
-std::set<std::string> movableJoints(const std::string& urdf_xml)
+namespace
+{
+/** Joints of a URDF that are not fixed. @param mimicking whether those that mimic others, or those that do not. */
+std::set<std::string> jointsThatMove(const std::string& urdf_xml, bool mimicking)
 {
   std::set<std::string> names;
   const urdf::ModelInterfaceSharedPtr model = urdf_xml.empty() ? nullptr : urdf::parseURDF(urdf_xml);
@@ -173,13 +176,25 @@ std::set<std::string> movableJoints(const std::string& urdf_xml)
   {
     for (const auto& [name, joint] : model->joints_)
     {
-      if (joint->type != urdf::Joint::FIXED && !joint->mimic)
+      if (joint->type != urdf::Joint::FIXED && (joint->mimic != nullptr) == mimicking)
       {
         names.insert(name);
       }
     }
   }
   return names;
+}
+
+}  // namespace
+
+std::set<std::string> movableJoints(const std::string& urdf_xml)
+{
+  return jointsThatMove(urdf_xml, false);
+}
+
+std::set<std::string> mimicJoints(const std::string& urdf_xml)
+{
+  return jointsThatMove(urdf_xml, true);
 }
 
 }  // namespace view_servo

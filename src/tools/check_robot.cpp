@@ -180,7 +180,7 @@ int run(const CheckOptions& options)
   }
   const ros::NodeHandle nh;
   detail::deferShutdown();
-  const check::RobotCheck robot(nh, options.setup);
+  check::RobotCheck robot(nh, options.setup);
   constexpr std::uint32_t THREADS = 2;
   ros::AsyncSpinner spinner(THREADS);
   spinner.start();
@@ -188,7 +188,7 @@ int run(const CheckOptions& options)
   {
     std::cerr << "Listening for " << options.seconds << " s" << std::endl;
   }
-  check::RobotCheck::listen(options.seconds, &detail::shutdownRequested);
+  robot.listen(options.seconds, &detail::shutdownRequested);
   if (detail::shutdownRequested())
   {
     return INTERRUPTED;

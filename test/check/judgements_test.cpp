@@ -309,8 +309,16 @@ TEST(CheckJudgements, NameEachFaultOfCommandsAndJoints)
     { "silent", [](Everything& a) { a.joints.stream.count = 0; }, "joint states", Level::WARNING, "no joint state" },
     { "no URDF", [](Everything& a) { a.joints.described = false; }, "joint states", Level::WARNING,
       "robot_description" },
-    { "another arm's", [](Everything& a) { a.joints.unknown = { "a", "b", "c", "d", "e", "f" }; }, "joint states",
-      Level::ERROR, "a, b, c, d and 2 more" },
+    { "another arm's",
+      [](Everything& a) {
+        a.joints.unknown = { "a", "b", "c", "d", "e", "f" };
+        a.joints.is_other = true;
+      },
+      "joint states", Level::ERROR, "a, b, c, d and 2 more" },
+    { "a gripper's, too", [](Everything& a) { a.joints.unknown = { "finger" }; }, "joint states", Level::WARNING,
+      "no joints finger" },
+    { "on no flange", [](Everything& a) { a.mount.is_static = true; }, "tf", Level::ERROR,
+      "does not move when the arm" },
     { "one is lacking", [](Everything& a) { a.joints.silent = { "wrist" }; }, "joint states", Level::WARNING, "wrist" },
     { "degrees", [](Everything& a) { a.joints.fault = "joint 'elbow' is at 90"; }, "joint states", Level::ERROR,
       "at 90" },

@@ -63,4 +63,7 @@ std::string robotDescription(const ros::NodeHandle& nh);
 /** Names of a URDF's joints that can move and mimic no other; empty when the text is empty or cannot be read. */
 std::set<std::string> movableJoints(const std::string& urdf_xml);
 
+/** Likewise of those that mimic others: who publishes an arm's states may publish theirs, too, or not. */
+std::set<std::string> mimicJoints(const std::string& urdf_xml);
+
 }  // namespace view_servo
