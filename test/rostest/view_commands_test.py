@@ -330,14 +330,20 @@ class ViewCommands(graph.GraphTest):
             process = self.begin("stop", "--patience", "0.5", "__ns:=" + space)
             out, err = process.communicate(timeout=PATIENCE)
             self.assertEqual((process.returncode, out), (CANNOT, ""), err)
-            self.assertRegex(err, r"^%s/peer: %s/homing/enable %s.*\nview: not reached: .*emergency stop\n$" %
+            self.assertRegex(err, r"^%s/peer: %s/homing/enable %s.*\nview: not stopped: .*emergency stop\n$" %
                              (space, space, cause))
         # One is reached, the other not.
         process = self.begin("stop", "--patience", "0.5", "servo:=/arm1/servo", "__ns:=/hanging")
         out, err = process.communicate(timeout=PATIENCE)
         self.assertEqual(process.returncode, NOT_DONE, out + err)
         self.assertIn("no goal is left", out)
-        self.assertIn("not reached", err)
+        self.assertIn("not stopped", err)
+        # A driver whose gate nobody finds may drive again.
+        process = self.begin("stop", "servo:=arm1/servo", "servo_25d/enable:=/nowhere")
+        out, err = process.communicate(timeout=PATIENCE)
+        self.assertEqual(process.returncode, NOT_DONE, out + err)
+        self.assertIn("its gate was not found, so that it drives again when a goal comes; no goal is left", err)
+        self.assertIn("not stopped", err)
 
     def test_watch(self):
         process = self.begin("watch")
