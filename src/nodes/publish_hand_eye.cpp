@@ -13,6 +13,7 @@
 #include <tf2_ros/transform_listener.h>
 
 #include <exception>
+#include <memory>
 #include <stdexcept>
 #include <string>
 
@@ -21,6 +22,7 @@ namespace view_servo
 namespace
 {
 constexpr int BAD_INPUT = 2;
+constexpr double LOOK_PERIOD = 0.5;  // [s]
 
 /** The frame at the top of the tree that a frame is in; the frame itself where tf does not know it. */
 std::string rootOf(const tf2_ros::Buffer& buffer, std::string frame)
@@ -81,11 +83,25 @@ void run()
   tf2_ros::Buffer buffer;
   const tf2_ros::TransformListener listener(buffer);
   ros::WallDuration(patience).sleep();  // until tf has come of all who publish it
-  const geometry_msgs::TransformStamped transform = placed(buffer, file, inverse);
-  tf2_ros::StaticTransformBroadcaster broadcaster;
-  broadcaster.sendTransform(transform);
-  ROS_INFO_STREAM("hand-eye calibration of '" << path << "': '" << transform.child_frame_id << "' is placed in '"
-                                              << transform.header.frame_id << "'");
+  geometry_msgs::TransformStamped transform;
+  std::unique_ptr<tf2_ros::StaticTransformBroadcaster> broadcaster;
+  const auto publish = [&] {
+    transform = placed(buffer, file, inverse);
+    broadcaster = std::make_unique<tf2_ros::StaticTransformBroadcaster>();  // without what the last one has published
+    broadcaster->sendTransform(transform);
+    ROS_INFO_STREAM("hand-eye calibration of '" << path << "': '" << transform.child_frame_id << "' is placed in '"
+                                                << transform.header.frame_id << "'");
+  };
+  publish();
+  // A driver that starts later may give the frame another parent: then what is above that has to be placed.
+  const ros::WallTimer watch =
+      ros::NodeHandle().createWallTimer(ros::WallDuration(LOOK_PERIOD), [&](const ros::WallTimerEvent& /*event*/) {
+        std::string parent;
+        if (buffer._getParent(transform.child_frame_id, ros::Time(0), parent) && parent != transform.header.frame_id)
+        {
+          publish();
+        }
+      });
   ros::spin();
 }
 

@@ -200,6 +200,22 @@ class HandEye(graph.GraphTest):
         numpy.testing.assert_allclose([translation.x, translation.y, translation.z],
                                       place + rotation @ [0.0, 0.0, 1.0], atol=1e-6)
 
+        # A camera whose driver starts later, and has a frame above the optical one, too.
+        found["parameters"]["tracking_base_frame"] = "late_optical_frame"
+        with open(os.path.join(self.directory, "late.yaml"), "w") as file:
+            yaml.safe_dump(found, file)
+        self.graph.start("rosrun", "view_servo", "publish_hand_eye", "_file:=" + os.path.join(self.directory, "late.yaml"),
+                         "_patience:=0")
+        graph.wait_until("the optical frame", lambda: self.static.get("late_optical_frame"))
+        below.header.frame_id, below.child_frame_id = "late_link", "late_optical_frame"
+        publisher.publish(TFMessage([below]))
+        placed = graph.wait_until("the driver's frame on the flange", lambda: self.static.get("late_link"))
+        self.assertEqual(placed.header.frame_id, "flange")
+        translation = placed.transform.translation
+        numpy.testing.assert_allclose([translation.x, translation.y, translation.z],
+                                      place + rotation @ [0.0, 0.0, 1.0], atol=1e-6)
+        self.assertEqual(self.static["late_optical_frame"].header.frame_id, "late_link")
+
         # The other way round: a flange that nothing else places, in the frame of a camera.
         found["parameters"].update(tracking_base_frame="third_camera", robot_effector_frame="third_flange")
         with open(os.path.join(self.directory, "third.yaml"), "w") as file:
