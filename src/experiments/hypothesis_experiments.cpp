@@ -21,7 +21,6 @@
 #include <opencv2/core/version.hpp>
 
 #include <algorithm>
-#include <chrono>
 #include <cmath>
 #include <filesystem>
 #include <iostream>
@@ -103,24 +102,40 @@ Correspondences pairsOf(const Problem& problem, const std::vector<Association>& 
 }
 
 #if VIEW_SERVO_HAS_USAC
-/** In an order of its own for each seed, as OpenCV's generator always starts alike. */
-Eigen::Matrix3d estimateByMagsac(const Correspondences& pairs, const Settings& settings, Rng& rng)
+/**
+ * USAC_MAGSAC with as many iterations and the sampling that the others have: PROGRESSIVE is PROSAC. Stops earlier only
+ * where more iterations could hardly find anything better.
+ */
+Eigen::Matrix3d estimateByMagsac(const Problem& problem, std::vector<Association> candidates, const Settings& settings,
+                                 Rng& rng)
 {
-  constexpr double CONFIDENCE = 0.9999;
+  const bool is_homography = settings.model == GeometryModel::HOMOGRAPHY;
+  const bool is_progressive = settings.sampling == Sampling::PROGRESSIVE;
+  if (is_progressive)
+  {
+    std::stable_sort(candidates.begin(), candidates.end(),
+                     [](const Association& a, const Association& b) { return a.weight > b.weight; });
+  }
   std::vector<cv::Point2d> from;
   std::vector<cv::Point2d> to;
-  for (const int i : detail::randomOrder(rng, pairs.size()))
+  for (const Correspondence& pair : pairsOf(problem, candidates))
   {
-    const Correspondence& pair = pairs[static_cast<std::size_t>(i)];
     from.emplace_back(pair.reference.x(), pair.reference.y());
     to.emplace_back(pair.current.x(), pair.current.y());
   }
+  cv::UsacParams params;  // what cv::USAC_MAGSAC stands for, but for sampling, confidence and state
+  params.score = cv::SCORE_METHOD_MAGSAC;
+  params.loMethod = cv::LOCAL_OPTIM_SIGMA;
+  params.loSampleSize = is_homography ? 75 : 50;
+  params.loIterations = is_homography ? 15 : 10;
+  params.sampler = is_progressive ? cv::SAMPLING_PROSAC : cv::SAMPLING_UNIFORM;
+  params.confidence = 1.0 - 1e-9;
+  params.maxIterations = settings.iterations;
+  params.threshold = settings.threshold;
+  params.randomGeneratorState = static_cast<int>(uniformIndex(rng, 1U << 30U));
   Eigen::Matrix3d matrix = Eigen::Matrix3d::Constant(NOT_A_NUMBER);
-  const cv::Mat found =
-      settings.model == GeometryModel::FUNDAMENTAL
-          ? cv::findFundamentalMat(from, to, cv::USAC_MAGSAC, settings.threshold, CONFIDENCE, settings.iterations)
-          : cv::findHomography(from, to, cv::USAC_MAGSAC, settings.threshold, cv::noArray(), settings.iterations,
-                               CONFIDENCE);
+  const cv::Mat found = is_homography ? cv::findHomography(from, to, cv::noArray(), params)
+                                      : cv::findFundamentalMat(from, to, cv::noArray(), params);
   if (found.size() == cv::Size(3, 3))
   {
     cv::cv2eigen(found, matrix);
@@ -146,7 +161,7 @@ Estimate run(const Problem& problem, const Settings& settings, Rng& rng)
   ransac_params.improvement_stage = settings.improvement;
   MultiHypothesisParams params;
   Estimate result;
-  const auto start = std::chrono::steady_clock::now();
+  const double begin = threadSeconds();
   if (settings.algorithm == Algorithm::RANSAC || settings.algorithm == Algorithm::MAGSAC)
   {
     const std::vector<Association> candidates =
@@ -155,7 +170,7 @@ Estimate run(const Problem& problem, const Settings& settings, Rng& rng)
     if (settings.algorithm == Algorithm::MAGSAC)
     {
 #if VIEW_SERVO_HAS_USAC
-      result.matrix = estimateByMagsac(pairs, settings, rng);
+      result.matrix = estimateByMagsac(problem, candidates, settings, rng);
 #endif
     }
     else if (settings.model == GeometryModel::FUNDAMENTAL)
@@ -195,7 +210,7 @@ Estimate run(const Problem& problem, const Settings& settings, Rng& rng)
       result.matches = found.matches;
     }
   }
-  result.ms = std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - start).count();
+  result.ms = 1e3 * (threadSeconds() - begin);
   return result;
 }
 

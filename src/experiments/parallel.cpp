@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <atomic>
+#include <ctime>
 #include <exception>
 #include <mutex>
 #include <thread>
@@ -45,6 +46,13 @@ void inParallel(std::size_t count, int max_threads, const std::function<void(std
   {
     std::rethrow_exception(failure);
   }
+}
+
+double threadSeconds()
+{
+  timespec used{};
+  clock_gettime(CLOCK_THREAD_CPUTIME_ID, &used);
+  return static_cast<double>(used.tv_sec) + 1e-9 * static_cast<double>(used.tv_nsec);
 }
 
 }  // namespace view_servo

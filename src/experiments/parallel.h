@@ -14,4 +14,7 @@ namespace view_servo
  */
 void inParallel(std::size_t count, int max_threads, const std::function<void(std::size_t)>& work);
 
+/** Processor time that the calling thread has used [s]. */
+double threadSeconds();
+
 }  // namespace view_servo

@@ -99,7 +99,7 @@ private:
 };
 
 /**
- * Words of ORB descriptors: 2,000 of them, learnt from the unrelated pictures, weighed by tf-idf, compared by angles.
+ * Words of the features that the view index has: 2,000 of them, learnt from the unrelated pictures, weighed by tf-idf, compared by angles.
  */
 class BagOfWords : public Ranking
 {
@@ -159,18 +159,18 @@ public:
   }
 
 private:
-  /** Bits as numbers, as the means of clusters are not binary. */
+  /** Bits of the features that the view index has, as numbers, as the means of clusters are not binary. */
   static cv::Mat describe(const cv::Mat& grey)
   {
-    std::vector<cv::KeyPoint> corners;
-    cv::Mat bytes;
-    cv::ORB::create(500)->detectAndCompute(grey, cv::noArray(), corners, bytes);
-    cv::Mat bits(bytes.rows, 8 * bytes.cols, CV_32F);
+    const std::vector<BinaryFeature> features = detectBinaryFeatures(grey, cv::Rect(), BinaryFeatureParams());
+    constexpr int BITS = 8 * sizeof(BinaryWord);
+    cv::Mat bits(static_cast<int>(features.size()), BITS, CV_32F);
     for (int row = 0; row < bits.rows; ++row)
     {
-      for (int bit = 0; bit < bits.cols; ++bit)
+      const BinaryWord& word = features[static_cast<std::size_t>(row)].word;
+      for (int bit = 0; bit < BITS; ++bit)
       {
-        bits.at<float>(row, bit) = static_cast<float>((bytes.at<unsigned char>(row, bit / 8) >> (bit % 8)) & 1);
+        bits.at<float>(row, bit) = static_cast<float>((word[static_cast<std::size_t>(bit / 64)] >> (bit % 64)) & 1U);
       }
     }
     return bits;

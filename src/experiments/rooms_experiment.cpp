@@ -50,6 +50,7 @@ constexpr double WRONG = 10.0;  // with more it is grossly wrong
 struct Answer
 {
   std::optional<Eigen::Matrix3d> f;
+  bool is_plane = false;  ///< a homography was answered instead
   Correspondences inliers;
 };
 
@@ -311,6 +312,7 @@ Answer answerOf(const FeatureParams& features, const RoomPair& pair, const Match
   {
     answer.f = match.matrix;
   }
+  answer.is_plane = match.outcome == MatchOutcome::MATCHED && match.model == GeometryModel::HOMOGRAPHY;
   return answer;
 }
 
@@ -421,6 +423,7 @@ struct RoomsSummary
 {
   int pairs = 0;
   int answers = 0;
+  int planes = 0;  ///< answers that are homographies: one plane is all that both views show
   int right = 0;
   int wrong = 0;
   std::vector<double> errors;  ///< of right ones [px]
@@ -447,7 +450,7 @@ void runRoomsExperiment(const ExperimentContext& context, std::ostream& csv)
     pairs.push_back(std::move(pair));
   }
   std::map<std::pair<std::string, std::string>, RoomsSummary> summaries;  // of set and method
-  csv << "set,pair,baseline_m,rotation_deg,method,answer,error_px,inliers,ms\n";
+  csv << "set,pair,baseline_m,rotation_deg,method,answer,plane,error_px,inliers,ms\n";
   for (const RoomPair& pair : pairs)
   {
     std::vector<Answer> answers;
@@ -478,11 +481,13 @@ void runRoomsExperiment(const ExperimentContext& context, std::ostream& csv)
       const std::string& name = methods[i].name;
       const double error = errorOf(answers[i], truths.at(methods[i].family));
       csv << pair.set << ',' << pair.name << ',' << pair.baseline << ',' << pair.rotation << ',' << name << ','
-          << (answers[i].f ? 1 : 0) << ',' << error << ',' << answers[i].inliers.size() << ',' << times[i] << '\n';
+          << (answers[i].f ? 1 : 0) << ',' << (answers[i].is_plane ? 1 : 0) << ',' << error << ','
+          << answers[i].inliers.size() << ',' << times[i] << '\n';
       std::cerr << ' ' << name << ' ' << error << " px (" << answers[i].inliers.size() << ')';
       RoomsSummary& summary = summaries[{ pair.set, name }];
       summary.pairs += 1;
       summary.answers += answers[i].f ? 1 : 0;
+      summary.planes += answers[i].is_plane ? 1 : 0;
       summary.right += error < RIGHT ? 1 : 0;
       summary.wrong += error > WRONG ? 1 : 0;
       if (error < RIGHT)
@@ -497,6 +502,10 @@ void runRoomsExperiment(const ExperimentContext& context, std::ostream& csv)
   {
     std::cout << key.first << ", " << key.second << ": of " << summary.pairs << " pairs " << summary.answers
               << " answered, " << summary.right << " right, " << summary.wrong << " grossly wrong";
+    if (summary.planes > 0)
+    {
+      std::cout << "; besides, " << summary.planes << " homographies of a plane";
+    }
     if (!summary.errors.empty())
     {
       std::cout << "; right ones " << medianOf(summary.errors) << " px in the median";

@@ -254,8 +254,11 @@ private:
     {
       outcome.length += compose(inverse(way_[i - 1]), way_[i]).distance();
     }
-    outcome.sideways_rms = measured_ > 0 ? std::sqrt(squares_ / static_cast<double>(measured_)) : 0.0;
-    outcome.sideways_max = farthest_;
+    if (measured_ > 0)
+    {
+      outcome.sideways_rms = std::sqrt(squares_ / static_cast<double>(measured_));
+      outcome.sideways_max = farthest_;
+    }
     outcome.distance_error = error.distance();
     outcome.yaw_error = error.yaw;
     outcome.duration = duration;

@@ -12,6 +12,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <limits>
 #include <string>
 #include <vector>
 
@@ -38,13 +39,14 @@ struct RouteTrialParams
 /** How a route was followed. */
 struct RouteOutcome
 {
-  bool arrived = false;         ///< whether homing says that it has arrived at the last view
-  std::string reason;           ///< why the run ended
-  std::size_t views = 0;        ///< number of views of the route
-  std::size_t reached = 0;      ///< number of the view that was driven to last, from 1
-  double length = 0.0;          ///< true length of the recorded way [m]
-  double sideways_rms = 0.0;    ///< RMS of the base's true distances from the recorded way, once a view was passed [m]
-  double sideways_max = 0.0;    ///< largest of these distances [m]
+  bool arrived = false;     ///< whether homing says that it has arrived at the last view
+  std::string reason;       ///< why the run ended
+  std::size_t views = 0;    ///< number of views of the route
+  std::size_t reached = 0;  ///< number of the view that was driven to last, from 1
+  double length = 0.0;      ///< true length of the recorded way [m]
+  /** RMS of the base's true distances from the recorded way, once a view was passed [m]; NaN where none was. */
+  double sideways_rms = std::numeric_limits<double>::quiet_NaN();
+  double sideways_max = std::numeric_limits<double>::quiet_NaN();  ///< largest of these distances [m]
   double distance_error = 0.0;  ///< true distance from the last view's place at the end [m]
   double yaw_error = 0.0;       ///< true yaw less that at the last view, at the end [rad]
   double duration = 0.0;        ///< time of following the route [s]

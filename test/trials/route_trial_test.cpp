@@ -65,6 +65,7 @@ TEST(RouteTrial, SaysWhereItLosesItsWay)
   EXPECT_FALSE(outcome.arrived);
   EXPECT_EQ(outcome.reason, "the view was not found");
   EXPECT_EQ(outcome.reached, 1U);
+  EXPECT_TRUE(std::isnan(outcome.sideways_rms)) << "no view was passed";
 }
 
 TEST(RouteTrial, RefusesARouteOfOnePlace)
