@@ -351,6 +351,7 @@ TEST_P(ShippedRunTest, EachImageIsAnsweredTrulyOrRefused)
   const Recorder<LineMatches> lines("line_matcher/line_matches");
   const std::map<ros::Time, CameraMessages> images = imagesOf(bag);
   int answered = 0;
+  int answered_by_lines = 0;
   for (const Frame& frame : frames)
   {
     SCOPED_TRACE("at " + std::to_string(frame.time) + " s");
@@ -365,9 +366,11 @@ TEST_P(ShippedRunTest, EachImageIsAnsweredTrulyOrRefused)
     }
     const std::optional<LineMatches> by_lines = answerTo(frame.stamp, lines);
     const bool supported = expectPossible(by_lines->points, truth, 3.0);  // intersections are less certain than corners
+    answered_by_lines += supported ? 1 : 0;
     EXPECT_TRUE(supported || !by_lines->reason.empty());
   }
   EXPECT_GE(answered, 4);
+  EXPECT_GE(answered_by_lines, 3);
 }
 
 INSTANTIATE_TEST_SUITE_P(Worlds, ShippedRunTest,

@@ -28,7 +28,8 @@ def yaw_of(orientation):
 class Replay(graph.GraphTest):
     def test_the_sample(self):
         self.assertLess(os.path.getsize(os.path.join(ROOT, "samples", "desk.bag")), LARGEST_BAG)
-        status, text = self.graph.run("roslaunch --wait view_servo replay.launch rviz:=false report:=pages", PATIENCE)
+        status, text = self.graph.run("roslaunch --wait view_servo replay.launch rviz:=false report:=pages "
+                                      "play_options:=--rate=0.6", PATIENCE)
         self.assertEqual(status, 0, text)
         pages = os.path.join(self.directory, "pages")
         bag, page = (os.path.join(pages, name) for name in sorted(os.listdir(pages)))
