@@ -68,7 +68,8 @@ HandEyeSession::HandEyeSession(const ros::NodeHandle& nh, const HandEyeSources& 
                      (sources_.on_base
                           ? "rosrun view_servo homography_tracker image_raw:=" + sources_.camera +
                                 "/image_raw camera_info:=" + sources_.camera + "/camera_info _odom_frame:=\"\""
-                          : "roslaunch view_servo arm_servo.launch sim:=false odom_frame:=\"\"") +
+                          : "roslaunch view_servo arm_servo.launch sim:=false dry_run:=true odom_frame:=none camera:=" +
+                                sources_.camera) +
                      " starts it";
   });
   SetView service;
