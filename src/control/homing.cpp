@@ -537,19 +537,17 @@ private:
   void checkStructure(const HeadingHypothesis& best, const Correspondences& matches, const PlanarPose& camera)
   {
     constexpr double CLEARLY_LESS = 0.7;
-    constexpr double NEARLY_INFINITE = -0.02;  // as the estimators have it [1 / distance moved]
     if (report_.tracked && report_.displacement <= params_.hypotheses.inlier_threshold)
     {
       return;  // where nothing has moved, any motion explains matches
     }
     const PlanarPose pose = compose(inverse(camera), *view_in_odom_);
-    const double farthest = NEARLY_INFINITE / pose.distance();
     const double threshold = params_.hypotheses.inlier_threshold / target_.camera.k(0, 0);
     const Eigen::Matrix3d essential = essentialMatrix(pose);
     Correspondences agreeing;
     for (const Correspondence& match : matches)
     {
-      if (sampsonError(essential, match) <= threshold * threshold && inverseDepth(match, pose).value >= farthest)
+      if (sampsonError(essential, match) <= threshold * threshold && inverseDepth(match, pose).value > 0.0)
       {
         agreeing.push_back(match);
       }
@@ -615,11 +613,11 @@ private:
     constexpr double WEIGHT = 0.2;
     constexpr double MAX_CHANGE = 4.0;
     constexpr double MAX_SCALE = 20.0;
-    constexpr double NOT_MOVED = 0.001;  // [m]
+    constexpr std::size_t MOST = 1000;
     const PlanarPose camera_in_view = inverse(view_in_camera);
-    if (!trail_.empty() && compose(inverse(trail_.back().in_odom), camera_in_odom).distance() < NOT_MOVED)
+    if (trail_.size() >= MOST)
     {
-      return;  // a camera that stands says nothing new
+      trail_.pop_back();  // the camera stands
     }
     trail_.push_back({ camera_in_odom, camera_in_view });
     while (trail_.size() > 2 && compose(inverse(trail_[1].in_odom), camera_in_odom).distance() > LONGEST)

@@ -47,11 +47,9 @@ Eigen::Isometry3d PlaceWatch::placeOf(const Sight& sight, double unit)
   return sight.camera * view_in_camera;
 }
 
-PlaceWatch::Verdict PlaceWatch::judge(const Sight& from, const Sight& to, double way, double turn)
+PlaceWatch::Verdict PlaceWatch::judge(const Sight& from, const Sight& to, double way, double turn, double least_turn)
 {
-  // Parts of the known motion that have to be seen. The unit of the way may be far from known, but a turn has none.
-  constexpr double LEAST_WAY = 0.1;
-  constexpr double LEAST_TURN = 0.4;
+  constexpr double LEAST_WAY = 0.1;  // part of the known way that has to be seen; the unit may be far from known
   const Eigen::Isometry3d known = from.camera.inverse() * to.camera;
   const Eigen::Isometry3d seen = from.view_in_camera * to.view_in_camera.inverse();
   const Eigen::Vector3d known_turn = rotationVector(known.linear());
@@ -62,7 +60,7 @@ PlaceWatch::Verdict PlaceWatch::judge(const Sight& from, const Sight& to, double
     return Verdict::OPEN;
   }
   const bool alike = (!far || alongPart(known.translation(), seen.translation()) >= LEAST_WAY) &&
-                     (!turned || alongPart(known_turn, rotationVector(seen.linear())) >= LEAST_TURN);
+                     (!turned || alongPart(known_turn, rotationVector(seen.linear())) >= least_turn);
   return alike ? Verdict::ALIKE : Verdict::OTHERWISE;
 }
 
@@ -79,6 +77,9 @@ void PlaceWatch::Doubt::add(double moved, Verdict verdict, double limit, const S
 
 bool PlaceWatch::add(const Eigen::Isometry3d& camera, const Eigen::Isometry3d& view_in_camera, double unit)
 {
+  // Parts of a turn that have to be seen. Wheels that slip turn the camera by less than odometry says.
+  constexpr double PROVED = 0.4;
+  constexpr double TURNED = 0.2;
   constexpr double BY_RANGE = 0.05;  // part of the distance of the view by which its place may change
   // Part of the camera's way since the last sight by which it may, too, as the unit is not known well. Not by all of it
   // where nothing was seen meanwhile: a picture that appears while the camera brakes is as far ahead as that way.
@@ -117,17 +118,18 @@ bool PlaceWatch::add(const Eigen::Isometry3d& camera, const Eigen::Isometry3d& v
   }
   is_new_ = jumped;
   last_ = now;
-  if (const Verdict verdict = judge(proof_from_, now, limits_.proof, limits_.proof_turn); verdict != Verdict::OPEN)
+  if (const Verdict verdict = judge(proof_from_, now, limits_.proof, limits_.proof_turn, PROVED);
+      verdict != Verdict::OPEN)
   {
     trusted_ = verdict == Verdict::ALIKE;
     proof_from_ = now;
   }
   // Each by itself: a picture that is turned round turns about the camera's axis as the camera does, but goes the other
   // way.
-  doubtful_way_.add(step.translation().norm(), judge(doubtful_way_.from, now, limits_.doubt / 2.0, NEVER),
+  doubtful_way_.add(step.translation().norm(), judge(doubtful_way_.from, now, limits_.doubt / 2.0, NEVER, TURNED),
                     limits_.doubt, now);
   doubtful_turn_.add(rotationVector(step.linear()).norm(),
-                     judge(doubtful_turn_.from, now, NEVER, limits_.doubt_turn / 2.0), limits_.doubt_turn, now);
+                     judge(doubtful_turn_.from, now, NEVER, limits_.doubt_turn / 2.0, TURNED), limits_.doubt_turn, now);
   return jumped;
 }
 

@@ -129,7 +129,7 @@ TEST(HomingTrial, StandsBetweenMatchesThatComeSeldomWhileNothingIsTracked)
 {
   const World world = coarseWorldOf("desk");
   HomingTrialParams params;
-  params.homing.tracker.min_supporting = 100000;
+  params.homing.tracker.min_supporting = params.homing.tracker.max_landmarks = 100000;
   params.use_lines = false;
   params.points_period = 2.5;
   params.max_duration = 12.0;

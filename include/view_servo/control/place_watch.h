@@ -100,8 +100,9 @@ private:
   /**
    * Whether the view was seen to move as the camera did since an earlier sight.
    * @param way [m] and @param turn [rad] of the camera, one of which it has to reach.
+   * @param least_turn part of the camera's turn that has to be seen.
    */
-  static Verdict judge(const Sight& from, const Sight& to, double way, double turn);
+  static Verdict judge(const Sight& from, const Sight& to, double way, double turn, double least_turn);
 
   PlaceWatchLimits limits_;
   std::optional<Sight> last_;  // empty at first, and after restart()
