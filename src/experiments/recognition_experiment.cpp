@@ -99,7 +99,8 @@ private:
 };
 
 /**
- * Words of the features that the view index has: 2,000 of them, learnt from the unrelated pictures, weighed by tf-idf, compared by angles.
+ * Words of the features that the view index has: 2,000 of them, learnt from the unrelated pictures, weighed by tf-idf,
+ * compared by angles.
  */
 class BagOfWords : public Ranking
 {

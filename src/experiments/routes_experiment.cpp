@@ -105,8 +105,11 @@ struct RouteSummary
   void add(const sim::RouteOutcome& outcome)
   {
     arrived += outcome.arrived ? 1 : 0;
-    rms.push_back(1e3 * outcome.sideways_rms);
-    farthest.push_back(1e3 * outcome.sideways_max);
+    if (std::isfinite(outcome.sideways_rms))  // else it has not passed a view
+    {
+      rms.push_back(1e3 * outcome.sideways_rms);
+      farthest.push_back(1e3 * outcome.sideways_max);
+    }
     millimetres.push_back(1e3 * outcome.distance_error);
     degrees.push_back(std::abs(outcome.yaw_error) * DEGREES);
     seconds.push_back(outcome.duration);
@@ -114,8 +117,8 @@ struct RouteSummary
 
   void print(std::ostream& stream) const
   {
-    stream << arrived << " of " << rms.size() << " arrive; beside the way: rms median " << medianOf(rms) << ", largest "
-           << quantileOf(rms, 1.0) << ", farthest median " << medianOf(farthest) << ", largest "
+    stream << arrived << " of " << seconds.size() << " arrive; beside the way: rms median " << medianOf(rms)
+           << ", largest " << quantileOf(rms, 1.0) << ", farthest median " << medianOf(farthest) << ", largest "
            << quantileOf(farthest, 1.0) << " mm; at the end: median " << medianOf(millimetres) << ", largest "
            << quantileOf(millimetres, 1.0) << " mm, yaw median " << medianOf(degrees) << ", largest "
            << quantileOf(degrees, 1.0) << " degrees; time: median " << medianOf(seconds) << ", longest "

@@ -98,15 +98,16 @@ cv::Vec4d fisheyeCoefficients(const Camera& camera)
  * How far from the optical axis a ray may be, on the plane z = 1, before the image of what is farther out would lie farther
  * in: no camera does so, only the polynomial does. Infinite where it never does. Tangential coefficients are left out.
  */
-double farthestRay(const Camera& camera)
+double findFarthestRay(const Camera& camera)
 {
   constexpr double STEP = 0.25 * DEGREE;
   constexpr double SIDEWAYS = 89.0 * DEGREE;
   std::vector<double> d = camera.distortion;
   d.resize(8, 0.0);
   const cv::Vec4d fisheye = fisheyeCoefficients(camera);
+  const bool is_fisheye = isFisheye(camera);
   const auto radius = [&](double angle) {
-    if (isFisheye(camera))
+    if (is_fisheye)
     {
       const double s = angle * angle;
       return angle * (1.0 + s * (fisheye[0] + s * (fisheye[1] + s * (fisheye[2] + s * fisheye[3]))));
@@ -126,6 +127,23 @@ double farthestRay(const Camera& camera)
     last = next;
   }
   return std::numeric_limits<double>::infinity();
+}
+
+/** As findFarthestRay(), of which each thread keeps the last answer: points are distorted one by one, too. */
+double farthestRay(const Camera& camera)
+{
+  struct Answer
+  {
+    bool is_fisheye = false;
+    std::vector<double> distortion;
+    double farthest = std::numeric_limits<double>::infinity();
+  };
+  thread_local Answer last;
+  if (last.is_fisheye != isFisheye(camera) || last.distortion != camera.distortion)
+  {
+    last = { isFisheye(camera), camera.distortion, findFarthestRay(camera) };
+  }
+  return last.farthest;
 }
 
 cv::Matx33d intrinsics(const Camera& camera)

@@ -25,7 +25,6 @@
 #include <opencv2/imgproc.hpp>
 
 #include <algorithm>
-#include <atomic>
 #include <cmath>
 #include <exception>
 #include <map>
@@ -396,14 +395,22 @@ public:
     data_.views_count += is_new ? 1 : 0;
   }
 
-  /** How long looking for topics and views took last [s]. */
-  double lookTime() const
+  bool isTimeToLook() const
   {
-    return look_time_;
+    const std::lock_guard<std::mutex> lock(mutex_);
+    return Clock::now() >= next_look_;
   }
-  void setLookTime(double time)
+  /**
+   * Waits with the next look: many views take view_store long to list, and it is not to be busy with that all the time.
+   * @param took how long looking for topics and views took [s].
+   */
+  void rest(double took)
   {
-    look_time_ = time;
+    constexpr double TIMES = 10.0;
+    constexpr double LONGEST = 30.0;  // [s]
+    const double wait = std::clamp(TIMES * took, LOOK_PERIOD, LONGEST);
+    const std::lock_guard<std::mutex> lock(mutex_);
+    next_look_ = Clock::now() + std::chrono::milliseconds(static_cast<int>(1000 * wait));
   }
 
   void lookForTopics()
@@ -593,7 +600,7 @@ private:
     std::string transport = "raw";
     if (place == &RobotSnapshot::camera)
     {
-      ros::NodeHandle("~").getParam("image_transport", transport);
+      ros::NodeHandle("~").getParam("camera_transport", transport);
     }
     if (endsWith(topic, COMPRESSED))
     {
@@ -747,8 +754,8 @@ private:
   }
 
   const RobotNames names_;
-  std::atomic<double> look_time_{ 0.0 };  // [s]
   mutable std::mutex mutex_;
+  Clock::time_point next_look_;  // when topics and views are looked for again
   RobotSnapshot data_;
   std::array<std::string, DRIVERS> nodes_;  // absolute names of those that serve the actions; empty: not known yet
   std::array<std::optional<Clock::time_point>, DRIVERS> diagnosed_;
@@ -775,7 +782,7 @@ TaskWorker::Task RobotLink::task(Body body) const
   };
 }
 
-RobotLink::RobotLink(const RobotNames& names) : core_(std::make_shared<Core>(names)), next_look_(Clock::now())
+RobotLink::RobotLink(const RobotNames& names) : core_(std::make_shared<Core>(names))
 {
   views_.add(task([](Core& core, ServiceCaller& /*caller*/) { core.connect(); }));
 }
@@ -803,16 +810,13 @@ RobotSnapshot RobotLink::snapshot()
                  false);
     }
   }
-  if (Clock::now() >= next_look_ && views_.isIdle())
+  if (core_->isTimeToLook() && views_.isIdle())
   {
-    // Many views take view_store long to list: it is no more than a tenth of the time busy with that.
-    next_look_ = Clock::now() +
-                 std::chrono::milliseconds(static_cast<int>(1000 * std::max(LOOK_PERIOD, 10 * core_->lookTime())));
     views_.add(task([](Core& core, ServiceCaller& caller) {
       const Clock::time_point begin = Clock::now();
       core.lookForTopics();
       core.lookForViews(caller, false);
-      core.setLookTime(secondsSince(begin));
+      core.rest(secondsSince(begin));
     }));
   }
   return core_->snapshot();

@@ -8,7 +8,6 @@
 #include <opencv2/core/types.hpp>
 
 #include <array>
-#include <chrono>
 #include <memory>
 #include <string>
 
@@ -49,9 +48,8 @@ private:
   template <typename Body>
   TaskWorker::Task task(Body body) const;
   std::shared_ptr<Core> core_;
-  TaskWorker views_;                                 // view_store and the master
-  std::array<TaskWorker, DRIVERS> gates_;            // one a driver, so that one that hangs does not hold up the others
-  std::chrono::steady_clock::time_point next_look_;  // when the views are listed again
+  TaskWorker views_;                       // view_store and the master
+  std::array<TaskWorker, DRIVERS> gates_;  // one a driver, so that one that hangs does not hold up the others
 };
 
 }  // namespace view_servo

@@ -200,14 +200,21 @@ void PlaneFilter::followNormals(const std::vector<EuclideanHomography>& solution
   const bool is_other = std::none_of(tracks_.begin(), tracks_.end(), [&](const Track& track) {
     return std::any_of(usable.begin(), usable.end(), [&](const auto& solution) { return is_near(track, solution); });
   });
-  others_ = is_other ? others_ + 1 : 0;
-  if (others_ >= FEWEST)
+  if (!is_other)
   {
-    tracks_.clear();  // what was seen first, from too near to the view, was no normal
+    others_ = Track();
+  }
+  else if (!tracks_.empty())
+  {
+    others_.add(usable.front());
+    if (others_.count >= FEWEST && others_.weight > tracks_.front().weight)
+    {
+      tracks_.clear();  // what was seen first, from too near to the view, was no normal
+    }
   }
   if (tracks_.empty())
   {
-    others_ = 0;
+    others_ = Track();
     for (const EuclideanHomography& solution : usable)
     {
       tracks_.emplace_back();

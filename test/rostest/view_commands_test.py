@@ -66,8 +66,12 @@ class Driver:
         self._result_type = result_type
         self.server = actionlib.ActionServer(action, action_type, self._take, self._cancel, auto_start=False)
         self.server.start()
-        self.service = rospy.Service(service, SetBool, self._enable)
+        self._gate = service
+        self.open_service()
         self.status = rospy.Publisher("status", ServoStatus, queue_size=10, latch=True)
+
+    def open_service(self):
+        self.service = rospy.Service(self._gate, SetBool, self._enable)
 
     def _enable(self, request):
         self.enabled = request.data
@@ -339,8 +343,10 @@ class ViewCommands(graph.GraphTest):
         self.assertIn("no goal is left", out)
         self.assertIn("not stopped", err)
         # A driver whose gate nobody finds may drive again.
-        process = self.begin("stop", "servo:=arm1/servo", "servo_25d/enable:=/nowhere")
+        self.arm.service.shutdown()
+        process = self.begin("stop", "servo:=arm1/servo")
         out, err = process.communicate(timeout=PATIENCE)
+        self.arm.open_service()
         self.assertEqual(process.returncode, NOT_DONE, out + err)
         self.assertIn("its gate was not found, so that it drives again when a goal comes; no goal is left", err)
         self.assertIn("not stopped", err)

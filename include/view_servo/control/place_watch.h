@@ -50,7 +50,7 @@ public:
   /** The last sight is not to be trusted, for another reason than that its place has jumped. */
   void doubt();
 
-  /** The view is not seen, for so long that the camera may have moved far before the next sight. */
+  /** The view is not seen: the camera may have moved before the next sight, as odometry or the commands say. */
   void interrupt();
 
   /**

@@ -63,13 +63,14 @@ struct Camera
 
   /**
    * Point (x, y) on the plane z = 1 of the optical frame -> pixel of the raw image, distortion applied. NaN when the
-   * camera is not calibrated, and for rays so far out that the distortion folds back. @throws std::invalid_argument for a distortion that fault() names.
+   * camera is not calibrated, and for rays so far out that the distortion folds back.
+   * @throws std::invalid_argument for a distortion that fault() names.
    */
   Points distorted(const Points& points) const;
 
   /**
    * Point of the optical frame [m], z > 0 -> pixel of the raw image, distortion applied. NaN when the camera is not
-   * calibrated and for points that are not in front of it.
+   * calibrated, for points that are not in front of it, and as distorted().
    * @throws std::invalid_argument for a distortion that fault() names.
    */
   Eigen::Vector2d project(const Eigen::Vector3d& point) const;

@@ -23,8 +23,8 @@ struct OdometryScale;
 struct PlaneFilterParams
 {
   /**
-   * Measurements are averaged whose camera was within this distance of the present one; d is known once two of them are
-   * this far apart [m].
+   * Measurements are averaged whose camera was within this distance of the present one [m]; d is known once two of them
+   * are this far apart, and from a third of that on where it is certain to 4 %.
    */
   double window = 0.1;
   int max_measurements = 60;  ///< largest number of measurements that are averaged
@@ -57,7 +57,7 @@ struct PlaneEstimate
  *
  * Averaged are the motions of those last measurements at which the camera was within `window` of where it is now:
  * odometry moves them into the last camera's frame, where the mean rotation follows from orthogonal Procrustes. The
- * distance d is known once two places of measurements are `window` apart. It follows from how much t/d changes when
+ * distance d is known once two places of measurements are `window` apart, or less where it is certain. It follows from how much t/d changes when
  * odometry says that the camera has moved by dt: t2/d - dR t1/d = dt/d, in least squares for 1/d. Solved for d it would
  * come out too small, because the left side is noisier than odometry's dt.
  *
@@ -141,7 +141,7 @@ private:
 
   PlaneFilterParams params_;
   std::vector<Track> tracks_;             // none, one or two; the likelier first
-  int others_ = 0;                        // measurements in a row whose normals are far from those of the tracks
+  Track others_;                          // measurements in a row whose normals are far from those of the tracks
   std::deque<Measurement> measurements_;  // of the window, newest last
   std::deque<Measurement> places_;        // apart from each other, also when the camera stands; newest last
   std::optional<Measurement> odd_;        // the last one, where it contradicts those
