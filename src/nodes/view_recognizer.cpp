@@ -7,6 +7,7 @@
 #include "view_servo/ros/camera_input.h"
 #include "view_servo/ros/conversions.h"
 #include "view_servo/ros/image_source.h"
+#include "view_servo/ros/live_parameters.h"
 #include "view_servo/ros/node_base.h"
 #include "view_servo/ros/node_params.h"
 #include "view_servo/ros/node_type_of.h"
@@ -31,6 +32,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <functional>
+#include <memory>
 #include <mutex>
 #include <optional>
 #include <stdexcept>
@@ -101,6 +103,8 @@ std::string describe(const std::vector<CandidateView>& views, std::size_t indexe
  * Services:
  *  - `~recognize` (view_servo/RecognizeView).
  *
+ * `~rate` may be changed while the node runs, see LiveParameters.
+ *
  * A thread of its own keeps the index in step with the store, and saves it beside the views, so that it is there at
  * once when the node starts again. Views that were saved a moment ago are indexed before a request is answered.
  */
@@ -123,6 +127,7 @@ public:
     ROS_INFO_STREAM("stored views are in "
                     << sources_.store().directory() << "; "
                     << (anew.empty() ? std::to_string(recognizer_.size()) + " are in the index" : anew));
+    live_parameters_ = std::make_unique<LiveParameters>(private_nh_, liveNumbers());
     indexer_ = std::thread([this] { keepInStep(); });
   }
 
@@ -137,6 +142,19 @@ public:
   }
 
 private:
+  /** The parameters that may be changed while the node runs. */
+  std::vector<LiveGroup> liveNumbers()
+  {
+    ViewRecognizerNodeParams started = params_;
+    return { liveGroup<ViewRecognizerNodeParams>(
+        started, aroundNow(nodeParameters(started), { "rate" }, LIVE_RATE),
+        [this](const ViewRecognizerNodeParams& live) {
+          const std::lock_guard<std::mutex> lock(mutex_);
+          rate_ = live.rate;
+          next_frame_ = Clock::time_point();
+        }) };
+  }
+
   void recognize(const RecognizeView::Request& request, RecognizeView::Response& response)
   {
     if (request.max_results < 0)
@@ -170,7 +188,7 @@ private:
         return;
       }
       next_frame_ =
-          now + std::chrono::duration_cast<Clock::duration>(std::chrono::duration<double>(1.0 / params_.rate));
+          now + std::chrono::duration_cast<Clock::duration>(std::chrono::duration<double>(1.0 / rate_));
     }
     worker_.put([&frame](std::optional<CameraFrame>& newest) { newest = frame; });
   }
@@ -249,9 +267,10 @@ private:
     status.add("Last image", last_);
   }
 
-  const ViewRecognizerNodeParams params_;
+  const ViewRecognizerNodeParams params_;  // as the node was started
 
   std::mutex mutex_;  // guards what follows
+  double rate_ = params_.rate;
   std::condition_variable wake_;
   Clock::time_point next_frame_;  // before it, camera images are left out
   bool unsaved_ = false;          // the index has changed since it was saved
@@ -269,6 +288,7 @@ private:
   ros::Publisher publisher_;
   ros::ServiceServer service_;
   Worker<std::optional<CameraFrame>> worker_;
+  std::unique_ptr<LiveParameters> live_parameters_;
   std::thread indexer_;
 };
 

@@ -1,5 +1,6 @@
 // Copyright (c) 2026, the view_servo authors
 // SPDX-License-Identifier: BSD-3-Clause
+#include "change_parameters.h"
 #include "node_test.h"
 
 #include "support/room_structure.h"
@@ -218,6 +219,14 @@ TEST_F(ViewRecognizerNodeTest, RecognizesWhatTheCameraSees)
 
   const cv::Mat blank(image.size(), CV_8UC1, cv::Scalar(100));
   EXPECT_TRUE(waitUntil([&] { return !recognized.last()->reason.empty(); }, [&] { send(blank); }));
+
+  // Its rate is changed while it runs: by 4 times at most, and at once, also where the next image was long to wait.
+  EXPECT_NEAR(changeParameters(NODE, { { "rate", 1000.0 } }).at("rate"), 200.0, 1e-9);
+  EXPECT_NEAR(changeParameters(NODE, { { "rate", 0.0 } }).at("rate"), 0.5, 1e-9);
+  const std::size_t before = recognized.messages().size();
+  ASSERT_TRUE(waitUntil([&] { return recognized.messages().size() > before; }, [&] { send(image); }));
+  changeParameters(NODE, { { "rate", 50.0 } });
+  EXPECT_TRUE(waitUntil([&] { return recognized.messages().size() > before + 2; }, [&] { send(image); }));
 
   RecognizeView::Request latest;
   latest.verify = true;
