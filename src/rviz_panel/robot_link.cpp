@@ -2,6 +2,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "rviz_panel/robot_link.h"
 
+#include "view_servo/DeleteView.h"
 #include "view_servo/FollowRouteAction.h"
 #include "view_servo/GetView.h"
 #include "view_servo/HomeToViewAction.h"
@@ -433,12 +434,13 @@ public:
     data_.image_topics = std::move(names);
   }
 
-  void save(ServiceCaller& caller, const std::string& view, const cv::Rect& region, bool overwrite)
+  void save(ServiceCaller& caller, const std::string& view, const cv::Rect& region, bool overwrite, bool learn)
   {
     SaveView service;
     service.request.name = view;
     service.request.roi = toRegionOfInterest(region);
     service.request.overwrite = static_cast<std::uint8_t>(overwrite);
+    service.request.learn = static_cast<std::uint8_t>(learn);
     std::string fault = ask(caller, "view_store/save", service, SAVE_PATIENCE);
     if (!fault.empty())
     {
@@ -456,6 +458,15 @@ public:
       const std::lock_guard<std::mutex> lock(mutex_);
       changed_ = view;
     }
+    lookForViews(caller, false);
+  }
+
+  void deleteView(ServiceCaller& caller, const std::string& view)
+  {
+    DeleteView service;
+    service.request.name = view;
+    const std::string fault = ask(caller, "view_store/delete", service, SAVE_PATIENCE);
+    say(fault.empty() ? service.response.message : "Not deleted: " + fault, fault.empty());
     lookForViews(caller, false);
   }
 
@@ -832,11 +843,16 @@ void RobotLink::reloadViews()
   views_.add(task([](Core& core, ServiceCaller& caller) { core.lookForViews(caller, true); }));
 }
 
-void RobotLink::store(const std::string& view, const cv::Rect& region, bool overwrite)
+void RobotLink::store(const std::string& view, const cv::Rect& region, bool overwrite, bool learn)
 {
   core_->say("Storing '" + view + "' ...", true);
-  views_.add(task(
-      [view, region, overwrite](Core& core, ServiceCaller& caller) { core.save(caller, view, region, overwrite); }));
+  views_.add(task([=](Core& core, ServiceCaller& caller) { core.save(caller, view, region, overwrite, learn); }));
+}
+
+void RobotLink::deleteView(const std::string& view)
+{
+  core_->say("Deleting '" + view + "' ...", true);
+  views_.add(task([view](Core& core, ServiceCaller& caller) { core.deleteView(caller, view); }));
 }
 
 void RobotLink::go(const std::string& view)

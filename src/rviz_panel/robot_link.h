@@ -29,8 +29,9 @@ public:
   void showOverlay(bool shown);
   /** Reads all views anew, also those that are known. */
   void reloadViews();
-  /** Stores what the camera sees. @param region [px]; empty: everywhere. */
-  void store(const std::string& view, const cv::Rect& region, bool overwrite);
+  /** Stores what the camera sees. @param region [px]; empty: everywhere. @param learn homing learns the view. */
+  void store(const std::string& view, const cv::Rect& region, bool overwrite, bool learn);
+  void deleteView(const std::string& view);
   /** Sends a goal to the driver that is there. */
   void go(const std::string& view);
   /** Opens the gate of the driver that is there. */

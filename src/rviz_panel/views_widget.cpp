@@ -36,6 +36,7 @@ namespace view_servo
 namespace
 {
 constexpr int PERIOD = 100;          // of looking at what has come [ms]
+constexpr int ASKED = 3000;          // so long Delete waits to be pressed again [ms]
 constexpr double OLD_PICTURE = 2.0;  // what is shown is called old from this age on [s]
 constexpr int NAME_ROLE = Qt::UserRole;
 constexpr int STAMP_ROLE = Qt::UserRole + 1;
@@ -144,6 +145,16 @@ ViewsWidget::ViewsWidget(QWidget* parent) : QWidget(parent)
       link_->reloadViews();
     }
   });
+  connect(delete_, &QPushButton::clicked, this, &ViewsWidget::deleteView);
+  disarm_ = new QTimer(this);
+  disarm_->setSingleShot(true);
+  connect(disarm_, &QTimer::timeout, this, [this] { arm(""); });
+  connect(views_, &QListWidget::currentItemChanged, this, [this] {
+    if (selectedView() != armed_)
+    {
+      arm("");
+    }
+  });
   connect(store_, &QPushButton::clicked, this, &ViewsWidget::store);
   connect(name_, &QLineEdit::returnPressed, this, &ViewsWidget::store);
   connect(robot_, &QLineEdit::editingFinished, this, &ViewsWidget::takeNames);
@@ -209,19 +220,26 @@ void ViewsWidget::buildControls(QWidget* place)
   enable_ = button("Enable", "enable");
   go_ = button("Go", "go");
   reload_ = button("Reload", "reload");
+  delete_ = button("Delete", "delete");
   auto* drive = new QHBoxLayout;
   drive->addWidget(enable_);
   drive->addWidget(go_);
-  drive->addWidget(reload_);
+  auto* list = new QHBoxLayout;
+  list->addWidget(reload_);
+  list->addWidget(delete_);
 
   name_ = new QLineEdit;
   name_->setObjectName("name");
   name_->setPlaceholderText("name of a new view");
   replace_ = new QCheckBox("Replace");
   replace_->setObjectName("replace");
+  learn_ = new QCheckBox("Learn");
+  learn_->setObjectName("learn");
+  learn_->setToolTip("homing learns where things are while somebody drives the base 0.3 m away");
   store_ = button("Store", "store");
   auto* keep = new QHBoxLayout;
   keep->addWidget(replace_);
+  keep->addWidget(learn_);
   keep->addWidget(store_, 1);
   words_ = wrappedLabel("words", 4);
 
@@ -245,6 +263,7 @@ void ViewsWidget::buildControls(QWidget* place)
   layout->addLayout(light);
   layout->addWidget(dry_run_);
   layout->addWidget(views_, 1);
+  layout->addLayout(list);
   layout->addLayout(drive);
   layout->addWidget(name_);
   layout->addLayout(keep);
@@ -288,6 +307,7 @@ void ViewsWidget::start()
   camera_picture_.release();
   views_->clear();
   words_->clear();
+  arm("");
   refresh();
 }
 
@@ -311,6 +331,7 @@ void ViewsWidget::refresh()
   }
   store_->setEnabled(!name_->text().isEmpty());
   go_->setEnabled(!selectedView().empty());
+  delete_->setEnabled(!selectedView().empty());
 }
 
 void ViewsWidget::showPictures(const RobotSnapshot& robot)
@@ -481,8 +502,33 @@ void ViewsWidget::store()
 {
   if (link_ && !name_->text().isEmpty())
   {
-    link_->store(name_->text().toStdString(), picture_->region(), replace_->isChecked());
+    link_->store(name_->text().toStdString(), picture_->region(), replace_->isChecked(), learn_->isChecked());
   }
+}
+
+// It is asked by the button itself: a dialog would be in the way of Stop.
+void ViewsWidget::deleteView()
+{
+  const std::string view = selectedView();
+  if (!link_ || view.empty())
+  {
+    return;
+  }
+  if (armed_ != view)
+  {
+    arm(view);
+    return;
+  }
+  arm("");
+  link_->deleteView(view);
+}
+
+void ViewsWidget::arm(const std::string& view)
+{
+  armed_ = view;
+  delete_->setText(view.empty() ? "Delete" : "Really delete?");
+  delete_->setStyleSheet(view.empty() ? "" : "color: #b01010; font-weight: bold;");
+  disarm_->start(ASKED);
 }
 
 std::string ViewsWidget::selectedView() const

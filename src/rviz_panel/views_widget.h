@@ -16,6 +16,7 @@ class QLabel;
 class QLineEdit;
 class QListWidget;
 class QPushButton;
+class QTimer;
 
 namespace view_servo
 {
@@ -58,6 +59,10 @@ private:
   void showRegion();
   void takeNames();
   void store();
+  /** Deletes the selected view, if the button has just been pressed for the same one. */
+  void deleteView();
+  /** Lets the button tell whether the next press deletes. @param view empty: it does not. */
+  void arm(const std::string& view);
   std::string selectedView() const;
 
   RobotNames names_;
@@ -69,6 +74,7 @@ private:
   bool shows_overlay_ = false;
   bool shows_fault_ = false;  // in place of the views
   bool has_region_ = false;
+  std::string armed_;  // the view that the next press of Delete deletes; empty: it asks
 
   PictureWidget* picture_ = nullptr;
   QLabel* region_ = nullptr;
@@ -81,8 +87,11 @@ private:
   QPushButton* enable_ = nullptr;
   QPushButton* go_ = nullptr;
   QPushButton* reload_ = nullptr;
+  QPushButton* delete_ = nullptr;
+  QTimer* disarm_ = nullptr;
   QLineEdit* name_ = nullptr;
   QCheckBox* replace_ = nullptr;
+  QCheckBox* learn_ = nullptr;
   QPushButton* store_ = nullptr;
   QLabel* words_ = nullptr;
   QLineEdit* robot_ = nullptr;

@@ -187,8 +187,19 @@ TEST_F(ViewsPanelTest, StoresADraggedRegionDrivesAndStops)
     return last.linear.x == 0.0 && last.linear.y == 0.0 && last.angular.z == 0.0;
   }));
   EXPECT_TRUE(waitForText("state", "homing: disabled")) << text("state");
+
+  // Delete asks by its button, and forgets it where nobody presses it again.
+  auto& views = find<QListWidget>("views");
+  auto& deletes = find<QPushButton>("delete");
+  press("delete");
+  EXPECT_EQ(deletes.text(), "Really delete?");
+  EXPECT_TRUE(waitForWidget([&] { return deletes.text() == "Delete"; }));
+  EXPECT_EQ(views.count(), 1);
+  press("delete");
+  press("delete");
+  EXPECT_TRUE(waitForWidget([&] { return views.count() == 0 && !deletes.isEnabled(); })) << text("words");
+  EXPECT_THROW(ViewStore(viewsDir("view_store")).load("dragged"), ViewStoreError);
   EXPECT_LT(longest_, 0.5 * SLOWDOWN);
-  removeViews("view_store");
 }
 
 TEST_F(ViewsPanelTest, DrivesAnArmToItsViewAndStopsIt)
