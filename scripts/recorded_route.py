@@ -50,11 +50,7 @@ def read_route(bag):
         "y": lambda m: m.pose.position.y,
         "yaw": lambda m: recorded_run.yaw_of_optical(m.pose.orientation),
     })
-    odometry = table("nav_msgs/Odometry", "odom", {
-        "x": lambda m: m.pose.pose.position.x,
-        "y": lambda m: m.pose.pose.position.y,
-        "yaw": lambda m: recorded_run.yaw_of_base(m.pose.pose.orientation),
-    })
+    odometry = recorded_run.read_odometry(bag, topics, topic)
     result = table("view_servo/FollowRouteActionResult", "result", {"message": lambda m: str(m.result.message)})
     start = feedback["t"][0]
     for each in (feedback, status, command, truth, odometry, result):
@@ -92,7 +88,7 @@ def draw_path(axes, run):
     """From above: what was driven before, such as the recording, and the run, in turn of its views."""
     path, legs = run["path"], legs_of(run["feedback"])
     if len(path["t"]) < 2:
-        note(axes, "no ground_truth and no odom during the run")
+        note(axes, "no ground_truth and no odometry during the run")
         return
     handles = []
     for way in ways_of(run["before"]):

@@ -43,13 +43,33 @@ class BadInput(Exception):
 # ------------------------------------------------------------------------------------------------------- reading
 
 
-def find_topic(topics, message_type, name, beside=""):
-    """The topic of that type and last name, of several the one nearest to `beside`, then the busiest; or None."""
-    found = [topic for topic, info in topics.items()
-             if info.msg_type == message_type and topic.split("/")[-1] == name and info.message_count > 0]
+def nearest_topic(topics, found, beside):
+    """Of the topics `found` the one nearest to `beside`, then the busiest; or None."""
     return max(found, default=None,
                key=lambda topic: (len(os.path.commonprefix([topic.split("/"), beside.split("/")])),
                                   topics[topic].message_count))
+
+
+def find_topic(topics, message_type, name, beside=""):
+    """The topic of that type and last name, of several the one nearest to `beside`, then the busiest; or None."""
+    return nearest_topic(topics, [topic for topic, info in topics.items() if info.msg_type == message_type and
+                                  topic.split("/")[-1] == name and info.message_count > 0], beside)
+
+
+def find_odometry(topics, beside=""):
+    """The topic of odometry: odom, or where there is none of that name, one of any name, as of a filter; or None."""
+    kind = "nav_msgs/Odometry"
+    return find_topic(topics, kind, "odom", beside) or nearest_topic(
+        topics, [topic for topic, info in topics.items() if info.msg_type == kind and info.message_count > 0], beside)
+
+
+def read_odometry(bag, topics, beside):
+    """The table of the base's poses by odometry."""
+    return read_table(bag, find_odometry(topics, beside), {
+        "x": lambda m: m.pose.pose.position.x,
+        "y": lambda m: m.pose.pose.position.y,
+        "yaw": lambda m: yaw_of_base(m.pose.pose.orientation),
+    })
 
 
 def read_table(bag, topic, columns):
@@ -128,11 +148,7 @@ def read_homing(bag):
         "y": lambda m: m.pose.position.y,
         "yaw": lambda m: yaw_of_optical(m.pose.orientation),
     })
-    odometry = table("nav_msgs/Odometry", "odom", {
-        "x": lambda m: m.pose.pose.position.x,
-        "y": lambda m: m.pose.pose.position.y,
-        "yaw": lambda m: yaw_of_base(m.pose.pose.orientation),
-    })
+    odometry = read_odometry(bag, topics, topic)
 
     start = heading["t"][0]
     end = heading["t"][-1] + AFTERMATH
@@ -230,7 +246,7 @@ def draw_path(axes, run, moments):
     """From above, in the colours of the states, with the published headings."""
     heading, path = run["heading"], run["path"]
     if not len(path["t"]):
-        note(axes, "no ground_truth and no odom during the run")
+        note(axes, "no ground_truth and no odometry during the run")
         return
     points = np.column_stack([path["x"], path["y"]])
     before = np.maximum(np.searchsorted(heading["t"], path["t"], side="right") - 1, 0)

@@ -32,6 +32,7 @@ import PIL.Image  # noqa: E402
 import rosbag  # noqa: E402
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus  # noqa: E402
 from geometry_msgs.msg import PoseStamped, TwistStamped  # noqa: E402
+from nav_msgs.msg import Odometry  # noqa: E402
 from rosgraph_msgs.msg import Log  # noqa: E402
 from sensor_msgs.msg import CompressedImage, Image  # noqa: E402
 from std_msgs.msg import String  # noqa: E402
@@ -269,7 +270,7 @@ class Report(unittest.TestCase):
         _, content, page = self.page([each for each in homing_messages() if each[0] == "/heading"])
         self.assertEqual(page.texts["verdict"].strip(), "no verdict the bag has no status of a driver")
         for section, words in (("numbers", "the bag has no ground truth"), ("pictures", "the bag has no camera images"),
-                               ("pictures", "nothing in the bag names the view"), ("path", "no ground_truth and no odom"),
+                               ("pictures", "nothing in the bag names the view"), ("path", "no ground_truth and no odometry"),
                                ("curves", "limits of the commands are not in the bag"), ("statuses", "has no status of a driver"),
                                ("diagnostics", "has no /diagnostics"), ("log", "has no /rosout"),
                                ("parameters", "no parameters of the parameter server"), ("versions", "has no versions")):
@@ -287,6 +288,20 @@ class Report(unittest.TestCase):
                                 ("/camera/image_raw", broken, 3.9), ("/run_view", image(0.0, "odd"), 0.1)])
         self.assertIn("fewer bytes than its size needs", page.texts["pictures"])
         self.assertIn("encoding 'odd'", page.texts["pictures"])
+
+    def test_odometry_and_images_of_other_names_are_found_and_overlays_are_no_camera(self):
+        names = {"/camera/image_raw": "/left/mono"}
+        messages = [(names.get(topic, topic), message, t) for topic, message, t in homing_messages() + more_messages()
+                    if topic != "/ground_truth"]
+        for i in range(41):
+            odometry = stamped(Odometry(), 0.1 * i)
+            odometry.pose.pose.position.x, odometry.pose.pose.orientation.w = 0.024 * i, 1.0
+            messages += [("/odometry/filtered", odometry, 0.1 * i), ("/point_matcher/overlay", image(0.1 * i), 0.1 * i)]
+        _, _, page = self.page(messages)
+        self.assertIn("by odometry", page.texts["path"])
+        self.assertNotIn("there is no path", page.texts["path"])
+        self.assertIn("12 of 16 matches of points agree", page.texts["pictures"])
+        self.assertIn("last image that has matches, 0.30 s before the last of all, at 3.90 s", page.texts["pictures"])
 
     def test_arm_with_the_view_from_the_directory(self):
         PIL.Image.fromarray(picture()).save(os.path.join(self.directory, "shelf.00.png"))
