@@ -58,12 +58,18 @@ class Robot:
 
     def run(self):
         point = PointMatch(reference_x=5, reference_y=6, current_x=7, current_y=8, inlier=True)
+        before = None  # matches come after the next image has
         while not self.ends.wait(PERIOD):
             stamp = rospy.Time.now()
             for topic, message in ((self.image, self.picture(stamp)), (self.heading, Heading(similarity=0.5)),
-                                   (self.matches, PointMatches(view="dock", matches=[point])), (self.command, TwistStamped())):
+                                   (self.command, TwistStamped())):
                 message.header.stamp = stamp
                 topic.publish(message)
+            if before is not None:
+                matches = PointMatches(view="dock", matches=[point])
+                matches.header.stamp = before
+                self.matches.publish(matches)
+            before = stamp
             self.published += 1
 
     def say(self, state, reason):
@@ -102,6 +108,7 @@ class RecordRun(graph.GraphTest):
         graph.wait_until("a page", lambda: [name for name in os.listdir(pages) if name.endswith(".html")], PATIENCE)
         self.assertEqual(sorted(name.split(".", 1)[1] for name in os.listdir(pages)), ["bag", "html"], os.listdir(pages))
         self.assertEqual(set(robot.asked), {"dock"})
+        graph.wait_until("no listener to commands after the goal", lambda: not robot.command.get_num_connections(), PATIENCE)
 
         bag, page = (os.path.join(pages, name) for name in sorted(os.listdir(pages)))
         with open(page) as file:
