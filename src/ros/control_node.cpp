@@ -7,6 +7,7 @@
 
 #include <algorithm>
 #include <atomic>
+#include <cctype>
 #include <csignal>
 #include <limits>
 #include <mutex>
@@ -118,6 +119,16 @@ ShutdownWatch& shutdownWatch()
   return watch;
 }
 
+/** A reason with its numbers left out, as of ages, which are others in every cycle. */
+std::string withoutNumbers(std::string reason)
+{
+  const auto is_of_number = [](unsigned char c) {
+    return std::isdigit(c) != 0 || c == '.';
+  };
+  reason.erase(std::remove_if(reason.begin(), reason.end(), is_of_number), reason.end());
+  return reason;
+}
+
 }  // namespace
 
 std_srvs::SetBool::Response CommandGate::set(bool enabled)
@@ -139,13 +150,16 @@ StatusOutput::StatusOutput(ros::NodeHandle& nh)
 void StatusOutput::publish(ServoStatus status)
 {
   const ros::WallDuration period(0.1);
-  const bool changed = status.state != last_.state || status.reason != last_.reason;
+  const bool moving = status.state == ServoStatus::SERVOING || status.state == ServoStatus::ACQUIRING ||
+                      status.state == ServoStatus::LOST;
+  const bool changed =
+      status.state != last_.state ||
+      (moving ? withoutNumbers(status.reason) != withoutNumbers(last_.reason) : status.reason != last_.reason);
   if (changed)
   {
     ROS_INFO_STREAM(status.reason);
   }
   const ros::WallTime now = ros::WallTime::now();
-  const bool moving = status.state == ServoStatus::SERVOING || status.state == ServoStatus::ACQUIRING;
   if (changed || (moving && now - last_time_ >= period))
   {
     publisher_.publish(status);
@@ -174,7 +188,7 @@ ServoStatus idleStatus(const CommandGate& gate)
 
 bool isOutdated(const ServoStatus& last, const CommandGate& gate)
 {
-  return last.state == (gate.open() ? ServoStatus::DISABLED : ServoStatus::IDLE);
+  return (last.state == ServoStatus::DISABLED) == gate.open();
 }
 
 void detail::deferShutdown()

@@ -121,7 +121,13 @@ TYPED_TEST_P(EveryDriverTest, RefusesTimesThatAreNone)
 TYPED_TEST_P(EveryDriverTest, StopsWhenDisabled)
 {
   this->drive();
-  this->expectToEnd([this] { this->enable(false); }, SimpleClientGoalState::ABORTED, "disabled");
+  const auto disable = [this] {
+    this->enable(false);
+    this->enable(true);  // before the next cycle of control
+  };
+  this->expectToEnd(disable, SimpleClientGoalState::ABORTED, "disabled");
+  EXPECT_TRUE(waitUntil([this] { return this->status_.last()->state == ServoStatus::IDLE; }));
+  this->enable(false);
   EXPECT_TRUE(waitUntil([this] { return this->status_.last()->state == ServoStatus::DISABLED; }));
 }
 

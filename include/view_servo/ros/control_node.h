@@ -52,13 +52,16 @@ private:
   std::atomic<bool> enabled_{ false };
 };
 
-/** Publishes a ServoStatus, latched: at once when state or reason changes, else at most ten times a second. */
+/**
+ * Publishes a ServoStatus, latched: at once when its state or reason changes, else at most ten times a second. Of a goal
+ * under way, a reason with other numbers is the same.
+ */
 class StatusOutput
 {
 public:
   explicit StatusOutput(ros::NodeHandle& nh);
 
-  /** Publishes it if state or reason has changed, or 0.1 s after the last one while it looks for the view or drives. */
+  /** Publishes it if state or reason has changed, or 0.1 s after the last one while a goal is under way. */
   void publish(ServoStatus status);
 
   /** The status given to publish() last, whether it was published or not. */
@@ -79,7 +82,7 @@ ServoStatus makeStatus(std::uint8_t state, const std::string& reason);
 /** The status of a node without a goal. */
 ServoStatus idleStatus(const CommandGate& gate);
 
-/** Whether idleStatus() has to be published because the gate was switched after the last status. */
+/** Whether idleStatus() has to be published, without a goal, because the gate was switched after the last status. */
 bool isOutdated(const ServoStatus& last, const CommandGate& gate);
 
 /** After a robot was moved, zeros are sent for some cycles, and then nothing, so that another node may drive it. */

@@ -173,7 +173,14 @@ private:
 
   void enable(const std_srvs::SetBool::Request& request, std_srvs::SetBool::Response& response)
   {
-    response = gate_.set(request.data != 0);
+    // A goal ends at once, not only if the gate is still closed in the next cycle.
+    locked([&] {
+      response = gate_.set(request.data != 0);
+      if (goal_ && !gate_.open())
+      {
+        finish(false, "disabled");
+      }
+    });
   }
 
   // ------------------------------------------------------------------------------------------------ the driver's view
