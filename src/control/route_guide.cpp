@@ -82,6 +82,7 @@ void RouteGuide::addReport(const HomingReport& report, const PlanarPose& base)
   {
     return;
   }
+  left_.erase(index_);
   blind_distance_ = blind_turn_ = 0.0;
   if (!report.tracked || !report.trusted)
   {
@@ -130,7 +131,7 @@ void RouteGuide::goOn()
   blind_distance_ = blind_turn_ = 0.0;
 }
 
-void RouteGuide::goTo(const std::string& view)
+std::size_t RouteGuide::indexOf(const std::string& view) const
 {
   const auto found =
       std::find_if(stops_.begin(), stops_.end(), [&](const RouteStop& stop) { return stop.view == view; });
@@ -138,7 +139,20 @@ void RouteGuide::goTo(const std::string& view)
   {
     throw std::logic_error("the view is not on the way");
   }
-  index_ = static_cast<std::size_t>(found - stops_.begin());
+  return static_cast<std::size_t>(found - stops_.begin());
+}
+
+bool RouteGuide::mayJumpTo(const std::string& view) const
+{
+  const std::size_t index = indexOf(view);
+  return index > index_ || (index < index_ && left_.count(index_) == 0);
+}
+
+void RouteGuide::jumpTo(const std::string& view)
+{
+  const std::size_t index = indexOf(view);
+  left_.insert(index_);
+  index_ = index;
   goal_.reset();
   due_ = found_ = false;
   blind_distance_ = blind_turn_ = 0.0;

@@ -68,7 +68,9 @@ public:
                   storeStructure(homing_.viewStore(), outcome);
                   listenToRecognizer();
                 },
-                {} }),
+                [this](const CameraFrame& /*frame*/) {
+                  listenToRecognizer();  // no longer, as there is no goal
+                } }),
       worker_("reading the next view of a route", [this](Order&& order) { load(order); })
   {
   }
@@ -214,7 +216,7 @@ private:
    * Drops the stops before the one that a recognizer sees. Nothing happens when there is no recognizer, or it sees none
    * of them within a few seconds. By a topic, as drivers call no services. Waits, without the mutex.
    */
-  void beginWhereTheBaseIs(std::vector<RouteStop>& stops) const
+  void beginWhereTheBaseIs(std::vector<RouteStop>& stops)
   {
     constexpr double PRESENCE = 0.5;  // until a recognizer is known to be there [s]
     constexpr double PATIENCE = 4.0;  // with its answer [s]
@@ -232,7 +234,11 @@ private:
     };
     ros::NodeHandle nh = context_.nodeHandle();
     const ros::Subscriber subscriber = nh.subscribe<RecognizedViews>("recognized", 1, take);
-    waitUntilReady(PRESENCE, [&] { return subscriber.getNumPublishers() > 0 ? "" : "a recognizer"; });
+    const auto given_up = [this] {
+      return !context_.isStillWanted();
+    };
+    waitUntilReady(
+        PRESENCE, [&] { return subscriber.getNumPublishers() > 0 ? "" : "a recognizer"; }, given_up);
     if (subscriber.getNumPublishers() == 0)
     {
       return;
@@ -241,9 +247,16 @@ private:
       const std::lock_guard<std::mutex> lock(answer->mutex);
       return answer->view;
     };
-    waitUntilReady(PATIENCE,
-                   [&] { return seen().empty() ? "a recognizer's answer on '" + subscriber.getTopic() + "'" : ""; });
-    if (const std::string view = seen(); !view.empty())
+    waitUntilReady(
+        PATIENCE, [&] { return seen().empty() ? "a recognizer's answer on '" + subscriber.getTopic() + "'" : ""; },
+        given_up);
+    const std::string view = seen();
+    if (view.empty())
+    {
+      ROS_INFO_STREAM("the recognizer on '" << subscriber.getTopic() << "' has seen no view of the route in "
+                                            << PATIENCE << " s, so the route begins at its first");
+    }
+    else
     {
       const auto stop =
           std::find_if(stops.begin(), stops.end(), [&](const RouteStop& other) { return other.view == view; });
@@ -308,7 +321,7 @@ private:
       }
       else
       {
-        guide_->goTo(order.view);
+        guide_->jumpTo(order.view);
         driveTo(task);
       }
     });
@@ -389,7 +402,7 @@ private:
     if (guide_ && lost_since_ && context_.goalRuns() && message.header.stamp >= since)
     {
       const std::string view = seenOf(stops_, message);
-      if (!view.empty() && view != guide_->view() && !(jumps_ && view == ordered_))
+      if (!view.empty() && guide_->mayJumpTo(view) && !(jumps_ && view == ordered_))
       {
         order(view, true);
       }

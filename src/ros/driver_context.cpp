@@ -89,7 +89,7 @@ DriverInput& DriverContext::addInput(const std::string& what, const std::string&
 void DriverContext::waitFor(const std::function<std::string()>& missing)
 {
   const auto ended = [this] {
-    return locked([this] { return !preparing(); });
+    return !isStillWanted();
   };
   const auto lacking = [&] {
     std::string what = missing();

@@ -191,12 +191,30 @@ TEST(RouteGuide, GoesToAnyViewOfTheWay)
   RouteGuide guide(RouteGuideParams(), makeRoute().stops, 0.1);
   const PlanarPose at_a{ 10.0, 5.0, 0.5 };
   guide.addReport(trackedReport(at_a, at_a, true), at_a);
-  guide.goTo("c");
+  guide.jumpTo("c");
   EXPECT_EQ(guide.view(), "c");
   EXPECT_TRUE(guide.last());
   EXPECT_FALSE(guide.isTimeToGoOn());
   EXPECT_FALSE(guide.blindCourse()) << "where it is is not known";
-  EXPECT_THROW(guide.goTo("x"), std::logic_error);
+  EXPECT_THROW(guide.jumpTo("x"), std::logic_error);
+}
+
+TEST(RouteGuide, GoesBackOnlyOnceForAViewThatIsNotFound)
+{
+  RouteGuide guide(RouteGuideParams(), makeRoute().stops, 0.1);
+  const PlanarPose at_a{ 10.0, 5.0, 0.5 };
+  guide.goOn();  // to b, which has changed since
+  ASSERT_EQ(guide.view(), "b");
+  EXPECT_FALSE(guide.mayJumpTo("b"));
+  EXPECT_TRUE(guide.mayJumpTo("c"));
+  ASSERT_TRUE(guide.mayJumpTo("a"));
+  guide.jumpTo("a");
+  guide.addReport(trackedReport(at_a, at_a, true), at_a);
+  guide.goOn();
+  EXPECT_FALSE(guide.mayJumpTo("a")) << "it would go to and fro";
+  EXPECT_TRUE(guide.mayJumpTo("c")) << "farther on";
+  guide.addReport(trackedReport(at_a, at_a, true), at_a);  // b is found after all
+  EXPECT_TRUE(guide.mayJumpTo("a"));
 }
 
 TEST(RouteGuide, SaysHowTheBaseIsPlacedOnTheLine)

@@ -11,6 +11,7 @@
 #include <cstddef>
 #include <limits>
 #include <optional>
+#include <set>
 #include <string>
 #include <vector>
 
@@ -91,8 +92,13 @@ public:
   }
   /** From now on the next view is homed to. There has to be one. */
   void goOn();
+  /**
+   * Whether the base may go on at `view` instead of view(), which is not found: at another one, and at an earlier one
+   * only once for each view() until that is found, as it may be there no more.
+   */
+  bool mayJumpTo(const std::string& view) const;
   /** From now on `view` is homed to, which has to be one of the stops; nothing is known yet of where it is. */
-  void goTo(const std::string& view);
+  void jumpTo(const std::string& view);
 
   /**
    * The way to view() by odometry, while homing does not know it: from the last view and how the two were recorded.
@@ -109,10 +115,14 @@ public:
   Deviation deviation(const PlanarPose& base) const;
 
 private:
+  /** @throws std::logic_error when the view is not one of the stops. */
+  std::size_t indexOf(const std::string& view) const;
+
   RouteGuideParams params_;
   std::vector<RouteStop> stops_;
   double blind_speed_;
   std::size_t index_ = 0;
+  std::set<std::size_t> left_;  // stops that were not found, for others that somebody saw
   bool due_ = false;
   bool found_ = false;              // homing knows the way to view()
   std::optional<PlanarPose> goal_;  // the base's pose at view()

@@ -258,6 +258,12 @@ public:
    */
   void waitFor(const std::function<std::string()>& missing);
 
+  /** Whether the goal that is being prepared is still wanted. Only for a driver's prepare(), without the mutex. */
+  bool isStillWanted()
+  {
+    return locked([this] { return preparing(); });
+  }
+
   /**
    * Publishes on `~wanted_view` the view of the goal that is being prepared, if that is still wanted. Only for prepare(),
    * without the mutex. @param expect is called just before with the goal's id, with the mutex held.
