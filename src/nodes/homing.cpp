@@ -156,6 +156,10 @@ public:
   {
     Progress progress = toProgress(homing_.report());
     progress.reason = stages_->where() + progress.reason;
+    if (progress.state == Progress::ARRIVED && !stages_->atLast())
+    {
+      progress.state = Progress::ACQUIRING;  // matches may say so, and the next view is wanted with the next image
+    }
     return progress;
   }
   Velocity wanted(double /*time*/) const

@@ -411,12 +411,14 @@ private:
                            ? plane->h.has_value()
                            : std::get<SceneFinder::Answer>(search->answer).kind == SceneFinder::Kind::SCENE;
     const PlaneTrack track = found ? session_->add(unfound_->image, unfound_->camera_in_odom) : PlaneTrack();
+    if (track.state != TrackingState::TRACKING)
+    {
+      updateStatus(task, track, news);  // that it is not there was published with the image
+      return;
+    }
     publish(task, track, unfound_->header, news);
     draw(task, unfound_->header, unfound_->camera_in_odom);
-    if (track.state == TrackingState::TRACKING)
-    {
-      unfound_.reset();
-    }
+    unfound_.reset();
   }
 
   /** Begins to look for the view in the newest image. */

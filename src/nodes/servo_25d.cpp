@@ -256,18 +256,22 @@ public:
       joints_.clearStuck();
       return twist;
     }
-    task_->failure = joints_.problem(steadySeconds());
+    // In a dry run no joint follows.
+    task_->failure = params_.node.dry_run ? "" : joints_.problem(steadySeconds());
     return task_->failure.empty() ? twist : Velocity(Velocity::Zero());
   }
 
   void sent(double time, const Velocity& twist)
   {
+    if (twist.isZero())
+    {
+      joints_.clearStuck();
+    }
     task_->servo().sent(time, twist);
   }
 
   void onMissingInput(double time, const std::string& why)
   {
-    joints_.clearStuck();
     if (task_->found)
     {
       task_->servo().addLoss(time, why);
@@ -483,8 +487,11 @@ private:
       homographies_.restart();
     }
     const std::string topic = "homographies on " + context_.quoted("homography");
-    const DriverInput::Stamp stamp = homographies_.checkStamp(message.header.stamp);
-    if (!homographies_.jump().empty())
+    // The tracker may find the view in an image after it has said that it does not.
+    const bool corrects = message.valid != 0 && !seen_ && message.header.stamp == homographies_.newestStamp() && !first;
+    const DriverInput::Stamp stamp =
+        corrects ? DriverInput::Stamp::NEWEST : homographies_.checkStamp(message.header.stamp);
+    if (!corrects && !homographies_.jump().empty())
     {
       context_.abort(homographies_.jump());
     }
@@ -492,6 +499,7 @@ private:
     {
       return;
     }
+    seen_ = message.valid != 0;
     const double age = ageOf(message.header.stamp);
     const std::string problem = apply(message, age);
     if (!problem.empty())
@@ -557,6 +565,7 @@ private:
   const std::string description_;  // URDF; empty: none
   JointGuard joints_;
   DriverInput& homographies_;
+  bool seen_ = false;  // the newest homography was valid
   DriverInput& joint_states_;
   const ViewStore store_;
   std::unique_ptr<Task> task_;
