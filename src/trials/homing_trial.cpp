@@ -153,7 +153,7 @@ public:
       if (!end_ && image_due_.due(time_))
       {
         const cv::Mat image = takeImage();
-        images_.add(time_ + IMAGE_DELAY, { time_, image });
+        images_.add(time_ + IMAGE_DELAY, { time_, image, toPlanar(nomad_.pose()) });
         match(image);
       }
       deliverImage();
@@ -214,7 +214,7 @@ private:
       images_in_sight_ += found_ && state != HomingState::LOST ? 1 : 0;
       if (on_step_)
       {
-        on_step_({ time_, toPlanar(nomad_.pose()), homing_->report(), nomad_.velocity() });
+        on_step_({ time_, ready->base, homing_->report(), nomad_.velocity() });
       }
     }
   }

@@ -54,7 +54,7 @@ struct HomingTrialParams
 struct HomingStep
 {
   double time = 0.0;      ///< since the start [s]
-  PlanarPose base;        ///< true pose of the base in the world [m, rad]
+  PlanarPose base;        ///< true pose of the base in the world when the image was taken [m, rad]
   HomingReport report;    ///< with what homing makes of the image
   BaseVelocity velocity;  ///< true velocity of the base, in its own frame [m/s, rad/s]
 };

@@ -81,6 +81,7 @@ public:
     light.gain *= params_.conditions.light_gain;
     camera_.setLight(light);
     nomad_.setPose(planarPose(start.x, start.y, start.yaw));
+    followed_ = start;
     return follow();
   }
 
@@ -130,15 +131,28 @@ private:
         store();
       }
       nomad_.step(STEP);
+      trace();
     }
     nomad_.halt();
+  }
+
+  /** Adds the base's true place to the recorded way, once it is a part of it that counts. */
+  void trace()
+  {
+    constexpr double APART = 0.01;  // [m]
+    const PlanarPose base = toPlanar(nomad_.pose());
+    if (way_.empty() || std::hypot(base.x - way_.back().x, base.y - way_.back().y) > APART)
+    {
+      way_.push_back(base);
+    }
   }
 
   void store()
   {
     views_.push_back({ camera_.capture(nomad_.cameraPose()), {} });
     stops_.push_back({ std::to_string(views_.size()), toPlanar(nomad_.odometry()), 0.0 });
-    way_.push_back(toPlanar(nomad_.pose()));
+    trace();
+    last_view_ = toPlanar(nomad_.pose());
     spacing_ = std::make_unique<RouteSpacing>(params_.spacing, views_.back().image, world_.camera, mount_);
   }
 
@@ -177,7 +191,7 @@ private:
       if (!end && image_due.due(time))
       {
         const cv::Mat image = camera_.capture(nomad_.cameraPose());
-        images_.add(time + IMAGE_DELAY, { time, image });
+        images_.add(time + IMAGE_DELAY, { time, image, toPlanar(nomad_.pose()) });
         if (matching_due.due(time))
         {
           const PreparedImage current(image, cv::Rect(), features_);
@@ -197,7 +211,10 @@ private:
         control();
       }
       nomad_.step(STEP);
-      measure();
+      if (!end)
+      {
+        measure();
+      }
     }
     return outcome(end, end.value_or(time));
   }
@@ -233,18 +250,21 @@ private:
 
   void measure()
   {
+    const PlanarPose base = toPlanar(nomad_.pose());
+    const double driven = compose(inverse(followed_), base).distance();
+    followed_ = base;
     if (guide_->number() > 1)
     {
-      const double off = distanceFrom(way_, toPlanar(nomad_.pose()));
-      squares_ += off * off;
-      ++measured_;
+      const double off = distanceFrom(way_, base);
+      squares_ += off * off * driven;
+      measured_ += driven;
       farthest_ = std::max(farthest_, off);
     }
   }
 
   RouteOutcome outcome(const std::optional<double>& end, double duration) const
   {
-    const PlanarPose error = compose(inverse(way_.back()), toPlanar(nomad_.pose()));
+    const PlanarPose error = compose(inverse(last_view_), toPlanar(nomad_.pose()));
     RouteOutcome outcome;
     outcome.arrived = homing_->report().state == HomingState::ARRIVED && guide_->last();
     outcome.reason = end ? homing_->report().reason : "not arrived in time: " + homing_->report().reason;
@@ -254,9 +274,9 @@ private:
     {
       outcome.length += compose(inverse(way_[i - 1]), way_[i]).distance();
     }
-    if (measured_ > 0)
+    if (measured_ > 0.0)
     {
-      outcome.sideways_rms = std::sqrt(squares_ / static_cast<double>(measured_));
+      outcome.sideways_rms = std::sqrt(squares_ / measured_);
       outcome.sideways_max = farthest_;
     }
     outcome.distance_error = error.distance();
@@ -276,7 +296,8 @@ private:
 
   std::vector<RecordedView> views_;
   std::vector<RouteStop> stops_;
-  std::vector<PlanarPose> way_;  // true poses at the views
+  std::vector<PlanarPose> way_;  // true places along the recorded way
+  PlanarPose last_view_;         // true pose at the last view
   std::unique_ptr<RouteSpacing> spacing_;
 
   std::unique_ptr<RouteGuide> guide_;
@@ -285,8 +306,9 @@ private:
   PlanarPose base_;  // by odometry
   Delayed<StampedImage> images_;
   Delayed<RouteEvidence> matches_;
-  double squares_ = 0.0;
-  std::size_t measured_ = 0;
+  PlanarPose followed_;    // true pose when its distance from the way was measured last
+  double squares_ = 0.0;   // of these distances, times the way driven [m^3]
+  double measured_ = 0.0;  // the way driven meanwhile [m]
   double farthest_ = 0.0;
 };
 

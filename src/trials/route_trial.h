@@ -44,7 +44,7 @@ struct RouteOutcome
   std::size_t views = 0;    ///< number of views of the route
   std::size_t reached = 0;  ///< number of the view that was driven to last, from 1
   double length = 0.0;      ///< true length of the recorded way [m]
-  /** RMS of the base's true distances from the recorded way, once a view was passed [m]; NaN where none was. */
+  /** RMS, over the way driven, of the base's true distances from the recorded way, once a view was passed [m]; or NaN. */
   double sideways_rms = std::numeric_limits<double>::quiet_NaN();
   double sideways_max = std::numeric_limits<double>::quiet_NaN();  ///< largest of these distances [m]
   double distance_error = 0.0;  ///< true distance from the last view's place at the end [m]

@@ -2,6 +2,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include "view_servo/geometry/planar_pose.h"
+
 #include <opencv2/core.hpp>
 
 #include <deque>
@@ -20,11 +22,12 @@ constexpr double CONTROL_PERIOD = 0.05;   ///< of a base's driver [s]
 constexpr double IMAGE_DELAY = 0.05;      ///< from an image's stamp until a base's driver gets it [s]
 constexpr double SETTLING = 1.0;          ///< from the end of servoing until the error is measured [s]
 
-/** An image and when it was taken. */
+/** An image, and when and where it was taken. */
 struct StampedImage
 {
   double stamp;  ///< [s]
   cv::Mat image;
+  PlanarPose base;  ///< true pose of the base in the world [m, rad]
 };
 
 /** Something that happens at time 0 and then once a period. */
