@@ -12,6 +12,8 @@ namespace view_servo::sim
 {
 namespace
 {
+constexpr double NOISE_PERIOD = 0.02;  // for which odometry_noise is given [s]
+
 /** Shortens a vector to at most a length. */
 Eigen::Vector2d limited(const Eigen::Vector2d& v, double length)
 {
@@ -52,7 +54,7 @@ std::vector<Parameter> parameters(NomadParams& params)
     real("odometry_drift", params.odometry_drift, "", "> -1", "distance measured too long, as a part of it"),
     real("odometry_turn_drift", params.odometry_turn_drift, "rad/m", "", "turn that odometry adds to a distance"),
     real("odometry_noise", params.odometry_noise, "", ">= 0",
-         "standard deviation of the measured motion, as a part of it"),
+         "standard deviation of the motion measured in 20 ms, as a part of it"),
     real("slip_share", params.slip_share, "", "[0, 1)",
          "share of the time in which its wheels slip, for short spells at random: odometry does not notice it"),
     real("slip_loss", params.slip_loss, "", "[0, 1]", "part of the motion that is lost while the wheels slip"),
@@ -160,8 +162,9 @@ void Nomad::step(double dt)
     motion.setZero();
   }
 
+  // Errors of shorter times are larger, as they average out in the end.
   const auto noise = [&] {
-    return 1.0 + params_.odometry_noise * gaussian(rng_);
+    return 1.0 + params_.odometry_noise * std::sqrt(NOISE_PERIOD / dt) * gaussian(rng_);
   };
   const double distance = motion.head<2>().norm();
   const double scale = (1.0 + params_.odometry_drift) * noise();

@@ -29,7 +29,7 @@ struct NomadParams
   double deadband_speed = 0.0;         ///< slower commands do not move it [m/s]
   double deadband_turn_rate = 0.0;     ///< slower commands do not turn it [rad/s]
   double odometry_turn_drift = 0.0;    ///< turn that odometry adds, by the way driven [rad/m]
-  double odometry_noise = 0.0;         ///< standard deviation of the measured motion, as a part of it
+  double odometry_noise = 0.0;         ///< standard deviation of the motion measured in 20 ms, as a part of it
   double slip_share = 0.0;             ///< share of the time in which the wheels slip, for short spells; [0, 1)
   double slip_loss = 0.5;              ///< part of the wheels' motion that is lost while they slip; [0, 1]
   double slip_duration = 0.5;          ///< of a spell, in the mean [s]

@@ -50,6 +50,16 @@ World withImageNoise(World world, double noise)
   return world;
 }
 
+World withObstaclesOf(World world, const std::vector<std::string>& groups)
+{
+  const auto is_away = [&](const Obstacle& obstacle) {
+    return !obstacle.group.empty() && std::find(groups.begin(), groups.end(), obstacle.group) == groups.end();
+  };
+  std::vector<Obstacle>& all = world.obstacles;
+  all.erase(std::remove_if(all.begin(), all.end(), is_away), all.end());
+  return world;
+}
+
 Camera withFocalLengthError(Camera camera, double error)
 {
   for (const int i : { 0, 1 })

@@ -40,6 +40,7 @@ struct Obstacle
 {
   std::string name;
   std::vector<Eigen::Vector2d> outline;  ///< corners [m]
+  std::string group;                     ///< of its surfaces; empty: none
 };
 
 /** How good the images of a camera are. */
@@ -102,6 +103,9 @@ struct World
 
 /** The world with another standard deviation of its images' noise [grey levels]; a negative one leaves it as it is. */
 World withImageNoise(World world, double noise);
+
+/** The world with only the obstacles that have no group, or one of these. */
+World withObstaclesOf(World world, const std::vector<std::string>& groups);
 
 /** A calibration whose focal lengths are too long by this part of them: 0.01 is one per cent. */
 Camera withFocalLengthError(Camera camera, double error);

@@ -54,6 +54,28 @@ const YAML::Node& requireKeys(const YAML::Node& node, const std::string& what, s
   return node;
 }
 
+/** The entries of a key that may be left out, which are a list. */
+YAML::Node listOf(const YAML::Node& map, const std::string& key)
+{
+  const YAML::Node node = map[key];
+  if (node && !node.IsSequence())
+  {
+    fail(node, "'" + key + "' must be a list");
+  }
+  return node;
+}
+
+/** The same, but a map of names. */
+YAML::Node namesOf(const YAML::Node& map, const std::string& key)
+{
+  const YAML::Node node = map[key];
+  if (node && !node.IsMap())
+  {
+    fail(node, "'" + key + "' must be a map of names");
+  }
+  return node;
+}
+
 template <typename Value>
 Value convert(const YAML::Node& node, const std::string& what)
 {
@@ -150,15 +172,16 @@ public:
       readLight(root_["light"]);
     }
     world_.background = numberOr(root_, "background", world_.background);
-    for (const auto& entry : required(root_, "textures", "a world"))
+    required(root_, "textures", "a world");
+    for (const auto& entry : namesOf(root_, "textures"))
     {
       addTexture(convert<std::string>(entry.first, "a texture's name"), entry.second);
     }
-    for (const auto& node : root_["rectangles"])
+    for (const auto& node : listOf(root_, "rectangles"))
     {
       forCopies(node, [&](const Eigen::Vector3d& offset) { addRectangle(node, offset); });
     }
-    for (const auto& node : root_["boxes"])
+    for (const auto& node : listOf(root_, "boxes"))
     {
       forCopies(node, [&](const Eigen::Vector3d& offset) { addBox(node, offset); });
     }
@@ -171,11 +194,11 @@ public:
     {
       readRegion(root_["region"]);
     }
-    for (const auto& entry : root_["starts"])
+    for (const auto& entry : namesOf(root_, "starts"))
     {
       world_.starts[convert<std::string>(entry.first, "a start's name")] = pose(entry.second);
     }
-    for (const auto& entry : root_["trajectories"])
+    for (const auto& entry : namesOf(root_, "trajectories"))
     {
       addTrajectory(convert<std::string>(entry.first, "a trajectory's name"), entry.second);
     }
@@ -440,7 +463,7 @@ private:
     const bool solid = node["solid"] ? convert<bool>(node["solid"], "solid") : true;
     if (solid && bottom.z() < ROBOT_HEIGHT && bottom.z() + size.z() > 0.0)
     {
-      Obstacle obstacle{ nameOf(node), {} };
+      Obstacle obstacle{ nameOf(node), {}, node["group"] ? convert<std::string>(node["group"], "group") : "" };
       for (const auto& [x, y] :
            { std::pair(0.5, 0.5), std::pair(-0.5, 0.5), std::pair(-0.5, -0.5), std::pair(0.5, -0.5) })
       {
@@ -474,6 +497,10 @@ private:
   void addTrajectory(const std::string& name, const YAML::Node& node)
   {
     std::vector<Waypoint> waypoints;
+    if (!node.IsSequence())
+    {
+      fail(node, "trajectory '" + name + "' must be a list of waypoints");
+    }
     for (const auto& entry : node)
     {
       Waypoint waypoint{ finite(required(entry, "time", "a waypoint"), "time"), pose(entry) };

@@ -87,7 +87,7 @@ public:
     reader.addFaults(robot_params.validate());
     reader.finish();
     robot_params.seed = params_.seed;
-    world_ = params_.load(Interface::KIND);
+    world_ = withObstaclesOf(params_.load(Interface::KIND), params_.groupNames());
     camera_ = std::make_unique<SimulatedCamera>(world_, params_.groupNames(), params_.seed);
     robot_ = Interface::makeRobot(world_, robot_params, nh_);
     interface_ = std::make_unique<Interface>(*robot_, FrameNames(params_.frame_prefix), nh_);

@@ -153,6 +153,34 @@ TEST(Nomad, OdometryNoiseIsTheSameForTheSameSeed)
   EXPECT_GT(apart(measured(1), measured(2)), 1e-6);
 }
 
+TEST(Nomad, OdometryNoiseDoesNotDependOnTheSteps)
+{
+  const World world = emptyWorld();
+  NomadParams params;
+  params.odometry_noise = 0.2;
+  // How far odometry is off after 1 s, in the root mean square of runs, is the noise of a step by the root of their number.
+  const auto error = [&](double dt) {
+    constexpr int RUNS = 60;
+    double squares = 0.0;
+    for (int i = 0; i < RUNS; ++i)
+    {
+      params.seed = i;
+      Nomad nomad(world, params);
+      nomad.command({ 0.0, 0.2, 0.0 });
+      for (int k = 0; k < std::lround(1.0 / dt); ++k)
+      {
+        nomad.step(dt);
+      }
+      squares += std::pow(apart(nomad.odometry(), nomad.pose()) / nomad.pose().translation().norm(), 2);
+    }
+    return std::sqrt(squares / RUNS);
+  };
+  for (const double dt : { 0.02, 0.01, 0.004 })
+  {
+    EXPECT_NEAR(error(dt) / (params.odometry_noise * std::sqrt(0.02)), 1.1, 0.3) << dt;
+  }
+}
+
 TEST(Nomad, StopsAtObstaclesAndNamesThem)
 {
   const World world = emptyWorld();

@@ -132,6 +132,10 @@ TEST(WorldReader, FaultsNameFileAndLine)
   expectFault("texture: grey}", "texture: grey, copies: {count: 0, step: [1, 0, 0]}}", "6", "count");
   expectFault("{x: 0, y: 0}", "{x: 0}", "7", "needs 'y'");
   expectFault("goal:", "gaol:", "7", "unknown key 'gaol'");
+  expectFault("goal:", "boxes: {size: [1, 1, 1]}\ngoal:", "7", "'boxes' must be a list");
+  expectFault("goal:", "starts: [here]\ngoal:", "7", "'starts' must be a map of names");
+  expectFault("goal:", "starts: 5\ngoal:", "7", "'starts' must be a map of names");
+  expectFault("goal:", "trajectories: {there: {x: 0, y: 0, time: 0}}\ngoal:", "7", "must be a list of waypoints");
   EXPECT_NE(faultOf("goal: {x: 0, y: 0}\n", "").find("needs 'goal'"), std::string::npos);
   EXPECT_NE(faultOf("kind: nomad, ", "kind: [nomad, ").find("world.yaml"), std::string::npos);
   for (const char* region : { "[1e300, 0, 9, 9]", "[0, 0, 9, 1e300]", "[-1, 0, 9, 9]", "[0.5, 0, 9, 9]",

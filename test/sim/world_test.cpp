@@ -42,6 +42,17 @@ TEST(World, ObstaclesAreTouchedByDiscsThatReachThem)
   EXPECT_EQ(touchedObstacle(world, { 0.9, 1.1 }, 0.15), "box");
 }
 
+TEST(World, ObstaclesAreThereWithTheirGroupOnly)
+{
+  const std::vector<Eigen::Vector2d> outline = { { 1.0, -1.0 }, { 2.0, -1.0 }, { 2.0, 1.0 }, { 1.0, 1.0 } };
+  World world;
+  world.obstacles = { { "person", outline, "people" } };
+  EXPECT_EQ(touchedObstacle(withObstaclesOf(world, { "chairs" }), { 1.5, 0.0 }, 0.1), "");
+  EXPECT_EQ(touchedObstacle(withObstaclesOf(world, { "chairs", "people" }), { 1.5, 0.0 }, 0.1), "person");
+  world.obstacles.push_back({ "box", outline, "" });
+  EXPECT_EQ(touchedObstacle(withObstaclesOf(world, {}), { 1.5, 0.0 }, 0.1), "box");
+}
+
 TEST(World, CamerasLookAtTheirTarget)
 {
   const Eigen::Vector3d position(0.3, -0.2, 0.9);
