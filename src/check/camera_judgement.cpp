@@ -106,7 +106,11 @@ Finding judgeCalibration(const CameraObservations& camera)
     return error(name, camera.calibration_fault, "calibrate the camera at this size (camera_calibration)");
   }
   const std::string& topic = camera.images.topic;
-  if (camera.has_distortion && topic.find("rect", topic.rfind('/') + 1) != std::string::npos)
+  const std::string transport = "/compressed";
+  const bool is_compressed = topic.size() > transport.size() &&
+                             topic.compare(topic.size() - transport.size(), transport.size(), transport) == 0;
+  const std::string raw = topic.substr(0, topic.size() - (is_compressed ? transport.size() : 0));
+  if (camera.has_distortion && raw.find("_rect", raw.rfind('/') + 1) != std::string::npos)
   {
     return error(name,
                  "'" + topic + "' seems to be rectified, but camera_info has distortion, which would be removed again",

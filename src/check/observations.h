@@ -84,11 +84,13 @@ struct OdometryObservations
 struct CommandObservations
 {
   std::string topic;
-  std::string wanted_type;              ///< type of the messages that drivers publish
-  std::string type;                     ///< type of the topic's messages, by the master; empty: it knows none
-  std::vector<std::string> listeners;   ///< nodes that subscribe
-  std::vector<std::string> publishers;  ///< nodes that publish there, other than the driver
-  bool dry_run = false;                 ///< the driver is to run dry, so that nobody need listen
+  std::string wanted_type;                     ///< type of the messages that drivers publish
+  std::string type;                            ///< type of the topic's messages, by the master; empty: it knows none
+  std::vector<std::string> listeners;          ///< nodes that subscribe
+  std::string stamped_topic;                   ///< of a base, where its driver publishes the same with a stamp
+  std::vector<std::string> stamped_listeners;  ///< nodes that subscribe that
+  std::vector<std::string> publishers;         ///< nodes that publish there, other than the driver
+  bool dry_run = false;                        ///< the driver is to run dry, so that nobody need listen
 };
 
 struct JointObservations

@@ -141,13 +141,16 @@ Findings judgeCommands(const CommandObservations& commands)
   {
     return { ok(name, "dry run: they go to '" + commands.topic + "', and nobody has to listen") };
   }
-  if (commands.listeners.empty())
+  const bool only_stamped = commands.listeners.empty() && !commands.stamped_listeners.empty();
+  if (commands.listeners.empty() && !only_stamped)
   {
     return { error(name, "nobody listens on '" + commands.topic + "'",
                    "start the robot's driver, say cmd_vel:= as its topic is named, or use dry_run:=true") };
   }
-  const std::string found = firstFew(commands.listeners) + " listens on '" + commands.topic + "'";
-  if (!commands.type.empty() && commands.type != "*" && commands.type != commands.wanted_type)
+  const std::string found = only_stamped
+                                ? firstFew(commands.stamped_listeners) + " listens on '" + commands.stamped_topic + "'"
+                                : firstFew(commands.listeners) + " listens on '" + commands.topic + "'";
+  if (!only_stamped && !commands.type.empty() && commands.type != "*" && commands.type != commands.wanted_type)
   {
     return { error(name, found + " for " + commands.type + ", commands are " + commands.wanted_type,
                    "put a node between that converts them, or say cmd_vel:= as the right topic is named") };

@@ -34,8 +34,8 @@ void sleepUntil(double time)
 
 }  // namespace
 
-Commander::Commander(const ros::NodeHandle& nh, const Setup& setup, std::string camera_frame)
-  : is_arm_(setup.is_arm), camera_frame_(std::move(camera_frame))
+Commander::Commander(const ros::NodeHandle& nh, const Setup& setup, const std::string& camera_frame)
+  : is_arm_(setup.is_arm), frame_(is_arm_ ? camera_frame : setup.fixedFrame())
 {
   ros::NodeHandle topics_nh(nh);
   const std::string topic = setup.commandTopic();
@@ -52,6 +52,7 @@ Commander::Commander(const ros::NodeHandle& nh, const Setup& setup, std::string 
   {
     using Event = ros::MessageEvent<const geometry_msgs::Twist>;
     publisher_ = topics_nh.advertise<geometry_msgs::Twist>(topic, 1);
+    stamped_publisher_ = topics_nh.advertise<geometry_msgs::TwistStamped>(STAMPED_COMMANDS, 1);
     const boost::function<void(const Event&)> callback = [this](const Event& e) {
       onCommand(e.getPublisherName());
     };
@@ -83,7 +84,9 @@ std::string Commander::connect(const std::function<bool()>& given_up)
   return waitUntilReady(
       PATIENCE,
       [&] {
-        return publisher_.getNumSubscribers() > OURSELVES ? "" : "nobody listens on '" + publisher_.getTopic() + "'";
+        const bool somebody =
+            publisher_.getNumSubscribers() > OURSELVES || (!is_arm_ && stamped_publisher_.getNumSubscribers() > 0);
+        return somebody ? "" : "nobody listens on '" + publisher_.getTopic() + "'";
       },
       given_up);
 }
@@ -92,10 +95,16 @@ void Commander::publish(const Twist& velocity)
 {
   geometry_msgs::TwistStamped message;
   message.header.stamp = ros::Time::now();
-  message.header.frame_id = camera_frame_;
+  message.header.frame_id = frame_;
   message.twist.linear = toMessage(velocity.head<3>());
   message.twist.angular = toMessage(velocity.tail<3>());
-  is_arm_ ? publisher_.publish(message) : publisher_.publish(message.twist);
+  if (is_arm_)
+  {
+    publisher_.publish(message);
+    return;
+  }
+  publisher_.publish(message.twist);
+  stamped_publisher_.publish(message);
 }
 
 void Commander::sendZeros()

@@ -25,8 +25,8 @@ inline const VelocityLimits TEST_LIMITS{ 0.05, 0.12, 0.1, 0.3 };
 class Commander
 {
 public:
-  /** @param camera_frame of an arm's twists. */
-  Commander(const ros::NodeHandle& nh, const Setup& setup, std::string camera_frame);
+  /** @param camera_frame of an arm's twists; a base's are in its own. */
+  Commander(const ros::NodeHandle& nh, const Setup& setup, const std::string& camera_frame);
   ~Commander();
   Commander(const Commander&) = delete;
   Commander& operator=(const Commander&) = delete;
@@ -53,9 +53,10 @@ private:
   void sendZeros();
 
   const bool is_arm_;
-  const std::string camera_frame_;
+  const std::string frame_;  // of the twists
   ros::Publisher publisher_;
-  mutable std::mutex mutex_;  // guards rival_
+  ros::Publisher stamped_publisher_;  // of a base
+  mutable std::mutex mutex_;          // guards rival_
   std::string rival_;
   ros::Subscriber subscriber_;  // ends first
 };

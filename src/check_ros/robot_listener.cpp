@@ -156,7 +156,9 @@ void JointListener::onJoints(const sensor_msgs::JointState& message)
   const std::lock_guard<std::mutex> lock(mutex_);
   meter_.add(steadySeconds(), ageOf(message.header.stamp), false);
   names_.insert(message.name.begin(), message.name.end());
-  fault_ = guard_.add(steadySeconds(), message.name, message.position, message.velocity);
+  // Several may publish there, each its own joints.
+  const std::string fault = guard_.add(steadySeconds(), message.name, message.position, message.velocity);
+  fault_ = fault.empty() ? fault_ : fault;
 }
 
 JointObservations JointListener::observations(const RosGraph& graph) const
@@ -247,6 +249,11 @@ CommandObservations observeCommands(const ros::NodeHandle& nh, const Setup& setu
   commands.type = graph.type(commands.topic);
   commands.dry_run = setup.dry_run;
   commands.listeners = graph.subscribers(commands.topic);
+  if (!setup.is_arm)
+  {
+    commands.stamped_topic = nh.resolveName(STAMPED_COMMANDS);
+    commands.stamped_listeners = graph.subscribers(commands.stamped_topic);
+  }
   const std::string driver = nh.resolveName(setup.is_arm ? "servo_25d" : "homing");
   const std::string result = nh.resolveName(setup.is_arm ? "servo/result" : "home/result");
   const std::string server = graph.publisher(result);  // the driver by another name, or the manager of its nodelet

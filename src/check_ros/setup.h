@@ -6,6 +6,9 @@
 
 namespace view_servo::check
 {
+/** Where a base's driver publishes its commands with a stamp, for bases that want these. */
+constexpr const char* STAMPED_COMMANDS = "cmd_vel_stamped";
+
 /** The arguments of homing.launch or arm_servo.launch that say how a robot is wired, with their names and defaults. */
 struct Setup
 {

@@ -98,6 +98,10 @@ std::string TestDrive::refusal(const Findings& findings, bool by_hand) const
   {
     return "dry_run:=true was asked for";
   }
+  if (robot_.setup().is_arm && robot_.setup().fixedFrame().empty())
+  {
+    return "how far the camera moves is known by tf only: say odom_frame:= as the frame that the arm stands in";
+  }
   const std::string topic = robot_.nodeHandle().resolveName(robot_.setup().commandTopic());
   const std::vector<std::string> others = RosGraph().publishers(topic);
   return others.empty() ? "" : join(others, ", ") + " publishes on '" + topic + "', too: stop it first";

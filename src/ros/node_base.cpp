@@ -49,7 +49,8 @@ std::string remedyOfAge(double age)
              : "";
 }
 
-ExitDeadline::ExitDeadline(std::function<bool()> asked) : thread_([this, asked = std::move(asked)] { watch(asked); })
+ExitDeadline::ExitDeadline(std::function<bool()> asked, int status)
+  : status_(status), thread_([this, asked = std::move(asked)] { watch(asked); })
 {
 }
 
@@ -70,7 +71,7 @@ void ExitDeadline::watch(const std::function<bool()>& asked)
     if (since && now - *since > PATIENCE)
     {
       std::fputs("ended at once: the node did not end in time by itself\n", stderr);
-      std::_Exit(0);
+      std::_Exit(status_);
     }
     if (!since && asked())
     {

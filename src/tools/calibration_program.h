@@ -157,10 +157,16 @@ CalibrationStatus calibrateFromFile(Calibration& calibration)
   return finish(calibration, poses, calibration.calibrate(poses.view, poses.poses));
 }
 
-/** By poses that somebody brings the robot to meanwhile. */
+/**
+ * By poses that somebody brings the robot to meanwhile.
+ * @param exit_deadline begins when all is written, however long that took after Ctrl-C.
+ */
 template <typename Calibration>
-CalibrationStatus calibrateAtRobot(Calibration& calibration)
+CalibrationStatus calibrateAtRobot(Calibration& calibration, std::optional<ExitDeadline>& exit_deadline)
 {
+  const auto from_now_on = [] {
+    return true;
+  };
   const CalibrationOptions& options = calibration.options;
   requireMaster();
   const ros::NodeHandle nh;
@@ -190,9 +196,12 @@ CalibrationStatus calibrateAtRobot(Calibration& calibration)
   }
   if (fault)
   {
+    exit_deadline.emplace(from_now_on, CANNOT_CALIBRATE);
     std::rethrow_exception(fault);
   }
-  return finish(calibration, poses, result);
+  const CalibrationStatus status = finish(calibration, poses, result);
+  exit_deadline.emplace(from_now_on, status);
+  return status;
 }
 
 /**
@@ -212,6 +221,7 @@ CalibrationStatus calibrateAtRobot(Calibration& calibration)
 template <typename Calibration>
 int runCalibration(int argc, char** argv)
 {
+  std::optional<ExitDeadline> exit_deadline;
   try
   {
     Calibration calibration;
@@ -224,8 +234,7 @@ int runCalibration(int argc, char** argv)
       return calibrateFromFile(calibration);
     }
     initQuietly(argc, argv, Calibration::NAME, ros::init_options::NoSigintHandler);
-    const ExitDeadline exit_deadline(&detail::shutdownRequested);
-    return calibrateAtRobot(calibration);
+    return calibrateAtRobot(calibration, exit_deadline);
   }
   catch (const std::exception& error)
   {

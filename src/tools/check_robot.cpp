@@ -226,7 +226,7 @@ int main(int argc, char** argv)
     }
     int count = static_cast<int>(pointers.size());
     initQuietly(count, pointers.data(), "check_robot", ros::init_options::NoSigintHandler);
-    const ExitDeadline exit_deadline(&detail::shutdownRequested);
+    const ExitDeadline exit_deadline(&detail::shutdownRequested, INTERRUPTED);
     return run(*options);
   }
   catch (const std::exception& error)

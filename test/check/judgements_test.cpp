@@ -170,6 +170,18 @@ TEST(CheckJudgements, NameEachFaultOfTheCamera)
     { "half of the images", [](Everything& a) { a.camera.pairs = 50; }, "camera_info", Level::WARNING, "50 of 100" },
     { "uncalibrated", [](Everything& a) { a.camera.calibration_fault = "the camera is not calibrated"; }, "calibration",
       Level::ERROR, "not calibrated" },
+    { "rectified",
+      [](Everything& a) {
+        a.camera.images.topic = "/camera/image_rect_color/compressed";
+        a.camera.has_distortion = true;
+      },
+      "calibration", Level::ERROR, "seems to be rectified" },
+    { "not rectified, by its name",
+      [](Everything& a) {
+        a.camera.images.topic = "/camera_rect/image_direct";
+        a.camera.has_distortion = true;
+      },
+      "calibration", Level::OK, "focal length" },
     { "telephoto", [](Everything& a) { a.camera.focal_length = 9000.0; }, "calibration", Level::WARNING, "4 degrees" },
     { "no stamps", [](Everything& a) { a.camera.images.stamp_fault = "image on 'x': no stamp, it is all zero"; },
       "image stamps", Level::ERROR, "all zero" },
@@ -299,6 +311,13 @@ TEST(CheckJudgements, NameEachFaultOfCommandsAndJoints)
       "commands", Level::OK, "dry run" },
     { "another type", [](Everything& a) { a.commands.type = "geometry_msgs/TwistStamped"; }, "commands", Level::ERROR,
       "TwistStamped" },
+    { "a listener to stamped commands",
+      [](Everything& a) {
+        a.commands.listeners.clear();
+        a.commands.stamped_topic = "/cmd_vel_stamped";
+        a.commands.stamped_listeners = { "/stamped_driver" };
+      },
+      "commands", Level::OK, "/stamped_driver" },
     { "a rival", [](Everything& a) { a.commands.publishers = { "/teleop" }; }, "commands", Level::WARNING, "/teleop" },
   };
   for (const Case& expected : base)

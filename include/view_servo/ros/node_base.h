@@ -119,8 +119,8 @@ void keepFreedMemory();
 class ExitDeadline
 {
 public:
-  /** @param asked returns whether the process has been asked to end. */
-  explicit ExitDeadline(std::function<bool()> asked);
+  /** @param asked returns whether the process has been asked to end. @param status its exit status when it is killed. */
+  explicit ExitDeadline(std::function<bool()> asked, int status = 0);
   ~ExitDeadline();
   ExitDeadline(const ExitDeadline&) = delete;
   ExitDeadline& operator=(const ExitDeadline&) = delete;
@@ -128,6 +128,7 @@ public:
 private:
   void watch(const std::function<bool()>& asked);
 
+  const int status_;
   std::atomic<bool> over_{ false };
   std::thread thread_;
 };
