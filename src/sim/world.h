@@ -40,7 +40,7 @@ struct Obstacle
 {
   std::string name;
   std::vector<Eigen::Vector2d> outline;  ///< corners [m]
-  std::string group;                     ///< of its surfaces; empty: none
+  std::string group = {};                ///< of its surfaces; empty: none
 };
 
 /** How good the images of a camera are. */
