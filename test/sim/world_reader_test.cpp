@@ -132,7 +132,7 @@ TEST(WorldReader, FaultsNameFileAndLine)
   expectFault("texture: grey}", "texture: grey, copies: {count: 0, step: [1, 0, 0]}}", "6", "count");
   expectFault("{x: 0, y: 0}", "{x: 0}", "7", "needs 'y'");
   expectFault("goal:", "gaol:", "7", "unknown key 'gaol'");
-  expectFault("goal:", "boxes: {size: [1, 1, 1]}\ngoal:", "7", "'boxes' must be a list");
+  expectFault("goal:", "rectangles: {size: [1, 1]}\ngoal:", "7", "'rectangles' must be a list");
   expectFault("goal:", "starts: [here]\ngoal:", "7", "'starts' must be a map of names");
   expectFault("goal:", "starts: 5\ngoal:", "7", "'starts' must be a map of names");
   expectFault("goal:", "trajectories: {there: {x: 0, y: 0, time: 0}}\ngoal:", "7", "must be a list of waypoints");
