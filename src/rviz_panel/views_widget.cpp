@@ -527,7 +527,7 @@ void ViewsWidget::arm(const std::string& view)
 {
   armed_ = view;
   delete_->setText(view.empty() ? "Delete" : "Really delete?");
-  delete_->setStyleSheet(view.empty() ? "" : "color: #b01010; font-weight: bold;");
+  delete_->setStyleSheet(view.empty() ? "" : "color: #b01010;");
   disarm_->start(ASKED);
 }
 
