@@ -162,16 +162,19 @@ void Nomad::step(double dt)
     motion.setZero();
   }
 
-  // Errors of shorter times are larger, as they average out in the end.
-  const auto noise = [&] {
-    return 1.0 + params_.odometry_noise * std::sqrt(NOISE_PERIOD / dt) * gaussian(rng_);
-  };
+  const double way_noise = params_.odometry_noise * gaussian(rng_);
+  const double turn_noise = params_.odometry_noise * gaussian(rng_);
   const double distance = motion.head<2>().norm();
-  const double scale = (1.0 + params_.odometry_drift) * noise();
-  const double turned = params_.odometry_turn_scale * motion.z() * noise() + params_.odometry_turn_drift * distance;
-  const Eigen::Vector3d measured(scale * motion.x(), scale * motion.y(), turned);
-  odometry_ = moved(odometry_, measured);
-  measured_ = measured / dt;
+  // What is measured when the noise is so many times as large.
+  const auto measured = [&](double times) {
+    const double scale = (1.0 + params_.odometry_drift) * (1.0 + times * way_noise);
+    const double turned =
+        params_.odometry_turn_scale * motion.z() * (1.0 + times * turn_noise) + params_.odometry_turn_drift * distance;
+    return Eigen::Vector3d(scale * motion.x(), scale * motion.y(), turned);
+  };
+  // Over shorter times it is larger, as it averages out in the end; velocities are measured over that period.
+  odometry_ = moved(odometry_, measured(std::sqrt(NOISE_PERIOD / dt)));
+  measured_ = measured(1.0) / dt;
 }
 
 Eigen::Isometry3d Nomad::pose() const

@@ -491,7 +491,7 @@ void addOptions(CommandLine& line, Options& options)
   line.number("odometry-drift", options.odometry_drift, { -0.9, 10.0 },
               "By which part the Nomad measures distances too long");
   line.number("odometry-noise", options.odometry_noise, { 0.0, 10.0 },
-              "Standard deviation of its measured motion, as a part of it");
+              "Standard deviation of the motion that it measures in 20 ms, as a part of it");
   line.number("encoder-noise", options.encoder_noise, { 0.0, 1.0 },
               "Standard deviation of the Puma's joint angles [rad]");
   line.text("urdf", options.urdf, "File that describes the Puma; default: the package's");
