@@ -57,6 +57,11 @@ Commander::Commander(const ros::NodeHandle& nh, const Setup& setup, const std::s
       onCommand(e.getPublisherName());
     };
     subscriber_ = topics_nh.subscribe<geometry_msgs::Twist>(topic, 1, callback);
+    using StampedEvent = ros::MessageEvent<const geometry_msgs::TwistStamped>;
+    const boost::function<void(const StampedEvent&)> stamped_callback = [this](const StampedEvent& e) {
+      onCommand(e.getPublisherName());
+    };
+    stamped_subscriber_ = topics_nh.subscribe<geometry_msgs::TwistStamped>(STAMPED_COMMANDS, 1, stamped_callback);
   }
 }
 
@@ -80,12 +85,12 @@ std::string Commander::rival() const
 std::string Commander::connect(const std::function<bool()>& given_up)
 {
   constexpr double PATIENCE = 5.0;        // [s]
-  constexpr std::uint32_t OURSELVES = 1;  // subscriber_
+  constexpr std::uint32_t OURSELVES = 1;  // subscriber_, stamped_subscriber_
   return waitUntilReady(
       PATIENCE,
       [&] {
-        const bool somebody =
-            publisher_.getNumSubscribers() > OURSELVES || (!is_arm_ && stamped_publisher_.getNumSubscribers() > 0);
+        const bool somebody = publisher_.getNumSubscribers() > OURSELVES ||
+                              (!is_arm_ && stamped_publisher_.getNumSubscribers() > OURSELVES);
         return somebody ? "" : "nobody listens on '" + publisher_.getTopic() + "'";
       },
       given_up);

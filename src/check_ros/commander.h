@@ -58,7 +58,8 @@ private:
   ros::Publisher stamped_publisher_;  // of a base
   mutable std::mutex mutex_;          // guards rival_
   std::string rival_;
-  ros::Subscriber subscriber_;  // ends first
+  ros::Subscriber subscriber_;  // these end first
+  ros::Subscriber stamped_subscriber_;
 };
 
 }  // namespace view_servo::check

@@ -257,7 +257,13 @@ CommandObservations observeCommands(const ros::NodeHandle& nh, const Setup& setu
   const std::string driver = nh.resolveName(setup.is_arm ? "servo_25d" : "homing");
   const std::string result = nh.resolveName(setup.is_arm ? "servo/result" : "home/result");
   const std::string server = graph.publisher(result);  // the driver by another name, or the manager of its nodelet
-  for (const std::string& node : graph.publishers(commands.topic))
+  std::set<std::string> nodes;
+  for (const std::string& topic : { commands.topic, commands.stamped_topic })
+  {
+    const std::vector<std::string> there = topic.empty() ? std::vector<std::string>() : graph.publishers(topic);
+    nodes.insert(there.begin(), there.end());
+  }
+  for (const std::string& node : nodes)
   {
     if (node != driver && node != server)
     {

@@ -102,9 +102,21 @@ std::string TestDrive::refusal(const Findings& findings, bool by_hand) const
   {
     return "how far the camera moves is known by tf only: say odom_frame:= as the frame that the arm stands in";
   }
-  const std::string topic = robot_.nodeHandle().resolveName(robot_.setup().commandTopic());
-  const std::vector<std::string> others = RosGraph().publishers(topic);
-  return others.empty() ? "" : join(others, ", ") + " publishes on '" + topic + "', too: stop it first";
+  std::vector<std::string> topics = { robot_.setup().commandTopic() };
+  if (!robot_.setup().is_arm)
+  {
+    topics.emplace_back(STAMPED_COMMANDS);
+  }
+  for (const std::string& name : topics)
+  {
+    const std::string topic = robot_.nodeHandle().resolveName(name);
+    const std::vector<std::string> others = RosGraph().publishers(topic);
+    if (!others.empty())
+    {
+      return join(others, ", ") + " publishes on '" + topic + "', too: stop it first";
+    }
+  }
+  return "";
 }
 
 // ----------------------------------------------------------------------------------------------------- measurement

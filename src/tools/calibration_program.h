@@ -159,7 +159,7 @@ CalibrationStatus calibrateFromFile(Calibration& calibration)
 
 /**
  * By poses that somebody brings the robot to meanwhile.
- * @param exit_deadline begins when all is written, however long that took after Ctrl-C.
+ * @param exit_deadline does not count from the first pose on until all is written, however long that takes after Ctrl-C.
  */
 template <typename Calibration>
 CalibrationStatus calibrateAtRobot(Calibration& calibration, std::optional<ExitDeadline>& exit_deadline)
@@ -174,12 +174,14 @@ CalibrationStatus calibrateAtRobot(Calibration& calibration, std::optional<ExitD
   constexpr std::uint32_t THREADS = 1;
   ros::AsyncSpinner spinner(THREADS);
   spinner.start();
+  exit_deadline.emplace(&detail::shutdownRequested, CANNOT_CALIBRATE);
   HandEyeSession session(nh, options.sources, &detail::shutdownRequested);
   calibration.prepare(session);
   std::cout << "view '" << options.sources.view << "': " << calibration.task() << "; Ctrl-C ends it with what there is"
             << std::endl;
   typename Calibration::Result result;
   std::exception_ptr fault;
+  exit_deadline.reset();
   try
   {
     result = collectPoses(calibration, session);
@@ -194,13 +196,20 @@ CalibrationStatus calibrateAtRobot(Calibration& calibration, std::optional<ExitD
   {
     keepPoses(poses, options.keep, Calibration::NAME);
   }
+  CalibrationStatus status = CANNOT_CALIBRATE;
+  try
+  {
+    status = fault ? status : finish(calibration, poses, result);
+  }
+  catch (const std::exception&)
+  {
+    fault = std::current_exception();
+  }
+  exit_deadline.emplace(from_now_on, status);
   if (fault)
   {
-    exit_deadline.emplace(from_now_on, CANNOT_CALIBRATE);
     std::rethrow_exception(fault);
   }
-  const CalibrationStatus status = finish(calibration, poses, result);
-  exit_deadline.emplace(from_now_on, status);
   return status;
 }
 
