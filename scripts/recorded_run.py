@@ -204,6 +204,16 @@ def travelled(path):
     return np.concatenate([[0.0], np.cumsum(steps)])[:len(path["t"])]
 
 
+def last_words(status):
+    """How the last goal ended, or what there is of it, for a title: what a driver without a goal says is left out."""
+    goals = [i for i, state in enumerate(status["state"]) if name_of(state, STATUS_STATES) not in ("idle", "disabled")]
+    if not len(status["t"]):
+        return ""
+    last = goals[-1] if goals else -1
+    reason = status["reason"][last]
+    return f"; {name_of(status['state'][last], STATUS_STATES)}" + (f": {reason}" if reason else "")
+
+
 def status_distance(status, t):
     """translation_error at times; NaN where there is no status near in time."""
     if not len(status["t"]):
@@ -470,9 +480,7 @@ def draw_homing(run, name):
     title = f"{name}, {run['topic']}: {duration(heading):.1f} s"
     if len(run["path"]["t"]):
         title += f", {travelled(run['path'])[-1]:.2f} m travelled"
-    if len(status["t"]):
-        title += f"; {name_of(status['state'][-1], STATUS_STATES)}"
-        title += f": {status['reason'][-1]}" if status["reason"][-1] else ""
+    title += last_words(status)
     figure.suptitle(title.replace("$", r"\$"), fontsize=13)
     return figure
 
@@ -603,9 +611,7 @@ def draw_arm(run, name):
     draw_arm_distance(panels["distance"], run)
 
     title = f"{name}, {run['topic']}: {duration(error):.1f} s"
-    if len(status["t"]):
-        title += f"; {name_of(status['state'][-1], STATUS_STATES)}"
-        title += f": {status['reason'][-1]}" if status["reason"][-1] else ""
+    title += last_words(status)
     figure.suptitle(title.replace("$", r"\$"), fontsize=13)
     return figure
 

@@ -251,6 +251,10 @@ private:
         PATIENCE, [&] { return seen().empty() ? "a recognizer's answer on '" + subscriber.getTopic() + "'" : ""; },
         given_up);
     const std::string view = seen();
+    if (given_up())
+    {
+      return;
+    }
     if (view.empty())
     {
       ROS_INFO_STREAM("the recognizer on '" << subscriber.getTopic() << "' has seen no view of the route in "

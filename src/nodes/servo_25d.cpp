@@ -338,7 +338,7 @@ public:
   void diagnose(diagnostic_updater::DiagnosticStatusWrapper& status) const
   {
     status.add("View", answer_.view());
-    status.add("Joint limits are watched", joint_states_.fresh());
+    status.add("Joint limits are watched", joint_states_.fresh() && !params_.node.dry_run);
   }
 
 private:

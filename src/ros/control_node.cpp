@@ -150,8 +150,7 @@ StatusOutput::StatusOutput(ros::NodeHandle& nh)
 void StatusOutput::publish(ServoStatus status)
 {
   const ros::WallDuration period(0.1);
-  const bool moving = status.state == ServoStatus::SERVOING || status.state == ServoStatus::ACQUIRING ||
-                      status.state == ServoStatus::LOST;
+  const bool moving = status.state == ServoStatus::SERVOING || status.state == ServoStatus::ACQUIRING;
   const bool changed =
       status.state != last_.state ||
       (moving ? withoutNumbers(status.reason) != withoutNumbers(last_.reason) : status.reason != last_.reason);

@@ -2,7 +2,12 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "rviz_panel/robot_light.h"
 
+#include "view_servo/ros/control_node.h"
+
 #include <diagnostic_msgs/DiagnosticStatus.h>
+
+#include <cstddef>
+#include <string>
 
 namespace view_servo
 {
@@ -32,10 +37,10 @@ RobotLight judgeDriver(const DriverState& driver)
   }
   if (driver.enabled && !*driver.enabled)
   {
-    // A goal that ended before the gate was closed is what the status still tells.
     light.colour = RobotLight::AMBER;
-    light.text = driver.kind + ": disabled, does not drive until Enable";
-    light.text += driver.status->state == ServoStatus::ABORTED ? "; the last goal: " + reason : "";
+    const std::size_t place = reason.find(LAST_GOAL);
+    light.text = driver.kind + ": disabled, does not drive until Enable" +
+                 (place == std::string::npos ? "" : reason.substr(place));
     return light;
   }
   const bool has_error = driver.level >= diagnostic_msgs::DiagnosticStatus::ERROR;

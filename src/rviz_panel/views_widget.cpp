@@ -528,7 +528,7 @@ void ViewsWidget::arm(const std::string& view)
   armed_ = view;
   delete_->setText(view.empty() ? "Delete" : "Really delete?");
   delete_->setStyleSheet(view.empty() ? "" : "color: #b01010;");
-  disarm_->start(ASKED);
+  view.empty() ? disarm_->stop() : disarm_->start(ASKED);
 }
 
 std::string ViewsWidget::selectedView() const

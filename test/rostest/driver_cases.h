@@ -135,6 +135,11 @@ TYPED_TEST_P(EveryDriverTest, StopsWhenTheGoalIsCancelled)
 {
   this->drive();
   this->expectToEnd([this] { this->client_.cancelGoal(); }, SimpleClientGoalState::PREEMPTED, "cancelled");
+  this->enable(false);  // which does not hide how the goal ended
+  EXPECT_TRUE(waitUntil([this] {
+    const ServoStatus status = *this->status_.last();
+    return status.state == ServoStatus::DISABLED && status.reason.find("; the last goal: ") != std::string::npos;
+  }));
 }
 
 TYPED_TEST_P(EveryDriverTest, StopsForAnotherGoal)

@@ -322,6 +322,10 @@ TEST(RobotLight, TellsTheWorstOfTheDriversThatAreThere)
   driver.status->state = ServoStatus::CONVERGED;
   driver.enabled = false;
   EXPECT_EQ(judgeRobot(robot).colour, RobotLight::AMBER);
+  driver.status->state = ServoStatus::DISABLED;
+  driver.status->reason = "does not drive until ~enable is called; the last goal: the view is lost";
+  EXPECT_EQ(judgeRobot(robot).text, "homing: disabled, does not drive until Enable; the last goal: the view is lost");
+  driver.status->state = ServoStatus::CONVERGED;
   driver.enabled = true;
   driver.silence = 5.0;
   EXPECT_EQ(judgeRobot(robot).colour, RobotLight::RED);

@@ -53,15 +53,15 @@ private:
 };
 
 /**
- * Publishes a ServoStatus, latched: at once when its state or reason changes, else at most ten times a second. Of a goal
- * under way, a reason with other numbers is the same.
+ * Publishes a ServoStatus, latched: at once when its state or reason changes, else at most ten times a second. While it
+ * looks for the view or drives, a reason with other numbers is the same.
  */
 class StatusOutput
 {
 public:
   explicit StatusOutput(ros::NodeHandle& nh);
 
-  /** Publishes it if state or reason has changed, or 0.1 s after the last one while a goal is under way. */
+  /** Publishes it if state or reason has changed, or 0.1 s after the last one while it looks for the view or drives. */
   void publish(ServoStatus status);
 
   /** The status given to publish() last, whether it was published or not. */
@@ -78,6 +78,9 @@ private:
 
 /** A status without errors or inliers, stamped now. */
 ServoStatus makeStatus(std::uint8_t state, const std::string& reason);
+
+/** In the reason of a status without a goal, what comes before how the last goal ended. */
+constexpr const char* LAST_GOAL = "; the last goal: ";
 
 /** The status of a node without a goal. */
 ServoStatus idleStatus(const CommandGate& gate);

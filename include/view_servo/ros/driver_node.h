@@ -496,9 +496,13 @@ private:
   void idle()
   {
     sendDueZero();
-    if (isOutdated(status_.last(), gate_))
+    const ServoStatus& last = status_.last();
+    if (isOutdated(last, gate_))
     {
-      status_.publish(idleStatus(gate_));
+      ServoStatus status = idleStatus(gate_);
+      const bool ended = last.state == ServoStatus::CONVERGED || last.state == ServoStatus::ABORTED;
+      status.reason += ended ? LAST_GOAL + last.reason : "";
+      status_.publish(status);
     }
   }
 
