@@ -351,16 +351,27 @@ class ViewCommands(graph.GraphTest):
         self.assertIn("its gate was not found, so that it drives again when a goal comes; no goal is left", err)
         self.assertIn("not stopped", err)
 
-    def test_watch(self):
-        process = self.begin("watch")
-        for state, reason in ((ServoStatus.ACQUIRING, "looks"), (ServoStatus.ACQUIRING, "looks"), (ServoStatus.LOST, "covered")):
-            graph.wait_until("a listener", lambda: self.homing.status.get_num_connections() > 0)
-            self.homing.status.publish(ServoStatus(state=state, reason=reason))
-        lines = [process.stdout.readline() for _ in range(2)]
-        while "lost" not in lines[-1]:  # what other tests have said
+    def lines_until(self, process, words):
+        """The lines that a process prints, up to one with these words. It is killed when that does not come in time."""
+        deadline = threading.Timer(PATIENCE, process.kill)
+        deadline.start()
+        lines = []
+        while not lines or words not in lines[-1]:
             lines.append(process.stdout.readline())
-        self.assertRegex(lines[-2], r"^\d\d:\d\d:\d\d  %s: acquiring: looks$" % rospy.get_name())
-        self.assertRegex(lines[-1], "lost: covered$")
+            self.assertNotEqual(lines[-1], "", "no line says '%s': %s" % (words, lines))
+        deadline.cancel()
+        return lines
+
+    def test_watch(self):
+        self.homing.status.publish(ServoStatus(state=ServoStatus.IDLE, reason="begins"))  # latched
+        process = self.begin("watch")
+        self.lines_until(process, "begins")  # it listens
+        for state, reason in ((ServoStatus.ACQUIRING, "looks"), (ServoStatus.ACQUIRING, "looks"), (ServoStatus.LOST, "covered")):
+            self.homing.status.publish(ServoStatus(state=state, reason=reason))
+        lines = self.lines_until(process, "lost")
+        self.assertEqual(len(lines), 2, lines)
+        self.assertRegex(lines[0], r"^\d\d:\d\d:\d\d  %s: acquiring: looks$" % rospy.get_name())
+        self.assertRegex(lines[1], "lost: covered$")
         process.send_signal(signal.SIGINT)
         self.assertEqual(self.end(process, DONE), "")
 
@@ -376,10 +387,7 @@ class ViewCommands(graph.GraphTest):
     def drive(self):
         """A `view go` that drives."""
         process = self.begin("go", "dock", "--enable", "--patience", "2", "__ns:=/base")
-        line = ""
-        while "servoing" not in line:
-            line = process.stdout.readline()
-            self.assertNotEqual(line, "", "it ended before it drove")
+        self.lines_until(process, "servoing")
         return process
 
     def test_drive(self):
@@ -389,7 +397,7 @@ class ViewCommands(graph.GraphTest):
         type(self).goal = self.pose
         self.move(-0.3)
         watch = self.begin("watch", "__ns:=/base")
-        self.assertIn("disabled", watch.stdout.readline())
+        self.lines_until(watch, "disabled")
         self.view("go dock __ns:=/base", NOT_DONE, "the gate of /base/homing is closed")
         if graph.SLOWDOWN == 1.0:  # what is built with sanitizers is too slow for images in real time
             out = self.view("go dock --enable --timeout 60 __ns:=/base")
