@@ -9,6 +9,8 @@
 #include <optional>
 #include <utility>
 
+#include <view_servo/ros/node_base.h>
+
 namespace view_servo
 {
 namespace
@@ -27,11 +29,6 @@ struct RunningCall
 
 constexpr std::chrono::milliseconds BEGINNING(50);
 constexpr std::chrono::milliseconds PATIENCE_AT_THE_END(500);
-
-std::string seconds(double time)
-{
-  return std::to_string(static_cast<int>(time)) + " s";
-}
 
 }  // namespace
 
