@@ -193,4 +193,21 @@ RouteGuide::Deviation RouteGuide::deviation(const PlanarPose& base) const
   return deviation;
 }
 
+RoutePlaces RouteGuide::places(std::size_t most) const
+{
+  RoutePlaces places;
+  if (!goal_)
+  {
+    return places;
+  }
+  const std::size_t first = index_ - std::min(index_, most);
+  const std::size_t end = index_ + std::min(stops_.size() - index_, most + 1);
+  places.index = index_ - first;
+  for (std::size_t i = first; i < end; ++i)
+  {
+    places.stops.push_back(compose(*goal_, relative(stops_[index_], stops_[i])));
+  }
+  return places;
+}
+
 }  // namespace view_servo

@@ -70,6 +70,9 @@ public:
                 },
                 [this](const CameraFrame& /*frame*/) {
                   listenToRecognizer();  // no longer, as there is no goal
+                },
+                [this] {
+                  return guide_ ? guide_->places(MOST_STOPS) : RoutePlaces();
                 } }),
       worker_("reading the next view of a route", [this](Order&& order) { load(order); })
   {
@@ -83,16 +86,16 @@ public:
     {
       throw std::invalid_argument("timeout must be finite and not negative");
     }
-    if (goal.route.empty())
+    if (goal.route.empty() && goal.goal.empty())
     {
-      throw std::invalid_argument("the goal names no route");
+      throw std::invalid_argument("the goal names neither a route nor a view on one");
     }
     if (goal.reverse && params_.homing.approach.base == BaseKind::DIFFERENTIAL)
     {
       throw std::invalid_argument(
           "a differential base cannot follow a route in reverse: record it in the other direction");
     }
-    const Route route = routes_.load(goal.route);
+    const Route route = routes_.load(goal.route.empty() ? routes_.routeWith(goal.goal) : goal.route);
     auto task = std::make_unique<Task>();
     task->stops = stopsBetween(route, goal.start, goal.goal, goal.reverse);
     if (goal.start.empty())
@@ -178,6 +181,8 @@ public:
   }
 
 private:
+  static constexpr std::size_t MOST_STOPS = 100;  // that markers show to either side of the base
+
   /** What the loader has to read. */
   struct Order
   {

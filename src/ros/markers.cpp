@@ -32,6 +32,7 @@ struct Sizes
   double arrow;    ///< length of arrows [m]
   double point;    ///< side of points [m]
 };
+constexpr double STOP = 0.08;  // diameter of a route's stops [m]
 constexpr Sizes OF_BASE{ 0.3, 0.012, 0.8, 0.03 };
 constexpr Sizes OF_ARM{ 0.08, 0.003, 0.15, 0.006 };
 
@@ -48,6 +49,7 @@ const std_msgs::ColorRGBA OF_VIEW = colour(0.3F, 0.7F, 1.0F);  // blue: where to
 const std_msgs::ColorRGBA OF_NOW = colour(1.0F, 0.6F, 0.1F);   // orange: where the robot is and was
 const std_msgs::ColorRGBA SUPPORTS = colour(0.2F, 0.9F, 0.3F);
 const std_msgs::ColorRGBA MISSING = colour(0.95F, 0.25F, 0.2F);
+const std_msgs::ColorRGBA OF_ROUTE = colour(0.6F, 0.6F, 0.6F);
 const std_msgs::ColorRGBA OF_PLANE = colour(0.3F, 0.7F, 1.0F, 0.3F);
 
 geometry_msgs::Point toPoint(const Eigen::Vector3d& place)
@@ -215,6 +217,24 @@ Places wayToGo(const HomingScene& scene)
   return way;
 }
 
+/** The route's line and its stops, blue from the one that is driven to on. */
+void addRoute(const std_msgs::Header& odom, const RoutePlaces& route, std::vector<Marker>& markers)
+{
+  Places places;
+  for (const PlanarPose& stop : route.stops)
+  {
+    places.push_back(onFloor(stop));
+  }
+  markers.push_back(markerOf(odom, "route", Marker::LINE_STRIP, OF_BASE.line, OF_ROUTE, places));
+  Marker stops = markerOf(odom, "stops", Marker::SPHERE_LIST, STOP, OF_VIEW, places, 1);
+  stops.scale.y = stops.scale.z = STOP;
+  for (std::size_t i = 0; i < stops.points.size(); ++i)
+  {
+    stops.colors.push_back(i < route.index ? OF_NOW : OF_VIEW);
+  }
+  markers.push_back(stops);
+}
+
 /** Where the rays of pixels meet a plane nᵀ X = d, in the camera's frame; NaN where they do not, or too far away. */
 Places onPlane(const Points& pixels, const Camera& camera, const Eigen::Vector3d& normal, double distance)
 {
@@ -267,6 +287,10 @@ MarkerArray toMarkers(const HomingScene& scene)
     place.z() = ABOVE_FLOOR;
   }
   markers.push_back(markerOf(odom, "way_driven", Marker::LINE_STRIP, OF_BASE.line, OF_NOW, driven));
+  if (scene.route)
+  {
+    addRoute(odom, *scene.route, markers);
+  }
   if (!goal)
   {
     const double heading = scene.report.heading;

@@ -344,6 +344,10 @@ void ViewHoming::draw(const HomingOutcome& outcome)
     scene.odom_frame = odometry_.frame();
     scene.base = base_in_odom_.value_or(PlanarPose());
     scene.driven = driven_.places();
+    if (hooks_.route)
+    {
+      scene.route = hooks_.route();
+    }
   });
   scene.stamp = toStamp(outcome.report.stamp);
   scene.base_frame = base_frame_;

@@ -50,11 +50,9 @@ struct DriverKind
 {
   std::string name;
   std::string action;
-  bool goes_to_views;  // a goal is a view, not a route
 };
-const std::array<DriverKind, DRIVERS> KINDS = { DriverKind{ "homing", "home", true },
-                                                DriverKind{ "servo_25d", "servo", true },
-                                                DriverKind{ "route_follower", "follow", false } };
+const std::array<DriverKind, DRIVERS> KINDS = { DriverKind{ "homing", "home" }, DriverKind{ "servo_25d", "servo" },
+                                                DriverKind{ "route_follower", "follow" } };
 
 cv::Mat toThumbnail(const sensor_msgs::Image& image, const cv::Rect& region)
 {
@@ -92,17 +90,18 @@ std::string whatIsFollowed(const diagnostic_msgs::DiagnosticStatus& tracking)
          (valueOf(tracking, "Followed as") == "scene" ? "a scene with depth" : "one plane");
 }
 
-std::string& targetOf(HomeToViewGoal& goal)
+/** The field of a goal for the view to drive to. */
+std::string& viewOf(HomeToViewGoal& goal)
 {
   return goal.view;
 }
-std::string& targetOf(ServoToViewGoal& goal)
+std::string& viewOf(ServoToViewGoal& goal)
 {
   return goal.view;
 }
-std::string& targetOf(FollowRouteGoal& goal)
+std::string& viewOf(FollowRouteGoal& goal)
 {
-  return goal.route;
+  return goal.goal;
 }
 
 /** Sends goals of one kind of driver. */
@@ -111,8 +110,8 @@ class DriverClient
 public:
   virtual ~DriverClient() = default;
   virtual bool isThere() const = 0;
-  /** @param target a view, or a route, by its name. */
-  virtual void go(const std::string& target) = 0;
+  /** Drives to a view. */
+  virtual void go(const std::string& view) = 0;
   virtual void cancelAll() = 0;
 };
 
@@ -135,10 +134,10 @@ public:
     return client_.isServerConnected();
   }
 
-  void go(const std::string& target) override
+  void go(const std::string& view) override
   {
     typename Action::_action_goal_type::_goal_type goal;
-    targetOf(goal) = target;
+    viewOf(goal) = view;
     handle_ = client_.sendGoal(goal, [this](Handle handle) {
       if (handle.getCommState() == actionlib::CommState::DONE)
       {
@@ -248,11 +247,6 @@ public:
 
   void go(std::size_t kind, const std::string& view)
   {
-    if (!KINDS[kind].goes_to_views)
-    {
-      say(KINDS[kind].name + " follows routes: its goals come by its action " + resolved(KINDS[kind].action), false);
-      return;
-    }
     if (const std::shared_ptr<Connections> connections = this->connections())
     {
       say(KINDS[kind].name + " is asked to drive to '" + view + "'", true);

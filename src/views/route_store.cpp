@@ -226,6 +226,32 @@ bool RouteStore::has(const std::string& name) const
   return isValidRouteName(name) && fs::exists(fs::symlink_status(yamlPath(directory_, name), ignored));
 }
 
+std::string RouteStore::routeWith(const std::string& view) const
+{
+  const Listing listing = list();
+  std::string found;
+  for (const std::string& name : listing.names)
+  {
+    const std::vector<RouteStop> stops = load(name).stops;
+    if (std::any_of(stops.begin(), stops.end(), [&](const RouteStop& stop) { return stop.view == view; }))
+    {
+      if (!found.empty())
+      {
+        throw RouteStoreError("view '" + view + "' is on route '" + found + "' and on route '" + name +
+                              "': name the one to follow");
+      }
+      found = name;
+    }
+  }
+  if (found.empty())
+  {
+    const std::string unknown =
+        listing.damaged.empty() ? "" : ", as far as is known: route '" + listing.damaged[0].name + "' is damaged";
+    throw RouteStoreError("view '" + view + "' is on no route" + unknown);
+  }
+  return found;
+}
+
 RouteStore::Listing RouteStore::list() const
 {
   Listing listing;

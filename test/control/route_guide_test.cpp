@@ -234,5 +234,25 @@ TEST(RouteGuide, SaysHowTheBaseIsPlacedOnTheLine)
   EXPECT_NEAR(guide.deviation(half).yaw, 0.0, 1e-12);
 }
 
+TEST(RouteGuide, PlacesTheStopsBesideTheViewThatIsFound)
+{
+  RouteGuide guide(RouteGuideParams(), makeRoute().stops, 0.1);
+  EXPECT_TRUE(guide.places(10).stops.empty()) << "nothing is known yet";
+  const PlanarPose at_a{ 10.0, 5.0, 0.5 };
+  guide.addReport(trackedReport(at_a, at_a, true), at_a);
+  guide.goOn();
+  const RoutePlaces places = guide.places(10);
+  ASSERT_EQ(places.stops.size(), 3U);
+  EXPECT_EQ(places.index, 1U);
+  const PlanarPose at_c = compose(at_a, { 1.0, 0.1, 0.2 });
+  EXPECT_NEAR(compose(inverse(at_a), places.stops[0]).distance(), 0.0, 1e-12);
+  EXPECT_NEAR(compose(inverse(at_c), places.stops[2]).distance(), 0.0, 1e-12);
+  EXPECT_NEAR(wrapAngle(places.stops[2].yaw - at_c.yaw), 0.0, 1e-12);
+  EXPECT_EQ(guide.places(0).stops.size(), 1U);
+  EXPECT_EQ(guide.places(0).index, 0U);
+  guide.jumpTo("c");
+  EXPECT_TRUE(guide.places(10).stops.empty()) << "where that is is not known";
+}
+
 }  // namespace
 }  // namespace view_servo

@@ -254,6 +254,26 @@ TEST(MarkersOfHoming, EachMessageHasAllPartsSoThatNothingOldStays)
   EXPECT_EQ(partOf(toMarkers(homingScene()), "view").action, Marker::DELETE);
 }
 
+TEST(MarkersOfHoming, ARouteIsALineWithItsStops)
+{
+  HomingScene scene = homingScene();
+  EXPECT_EQ(all(toMarkers(scene)).count("route"), 0U) << "no route is followed";
+  scene.route.emplace();
+  EXPECT_EQ(partOf(toMarkers(scene), "route").action, Marker::DELETE) << "where it is is not known yet";
+  EXPECT_EQ(partOf(toMarkers(scene), "stops").action, Marker::DELETE);
+  scene.route->stops = { { 0.0, 1.0, 0.0 }, { 1.0, 2.0, 0.1 }, { 2.0, 2.5, 0.2 } };
+  scene.route->index = 1;
+  const MarkerArray message = toMarkers(scene);
+  expectWellFormed(message);
+  EXPECT_EQ(partOf(message, "route").header.frame_id, "odom");
+  EXPECT_EQ(partOf(message, "route").points.size(), 3U);
+  const Marker& stops = partOf(message, "stops");
+  ASSERT_EQ(stops.points.size(), 3U);
+  EXPECT_EQ(toVector(stops.points[2]).head<2>(), Eigen::Vector2d(2.0, 2.5));
+  EXPECT_GT(stops.colors[0].r, stops.colors[0].b) << "it has been passed";
+  EXPECT_GT(stops.colors[1].b, stops.colors[1].r) << "it is driven to";
+}
+
 TEST(MarkersOfHoming, NothingIsDrawnOfWhatIsNotKnown)
 {
   HomingScene scene = homingScene();

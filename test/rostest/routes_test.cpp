@@ -8,15 +8,18 @@
 #include "view_servo/parameters/numbers.h"
 
 #include <gtest/gtest.h>
+#include <visualization_msgs/MarkerArray.h>
 
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
 #include <cstdio>
+#include <deque>
 #include <filesystem>
 #include <mutex>
 #include <set>
 #include <string>
+#include <vector>
 
 namespace view_servo
 {
@@ -26,6 +29,23 @@ namespace
 {
 using GoalState = actionlib::SimpleClientGoalState;
 
+using visualization_msgs::Marker;
+using visualization_msgs::MarkerArray;
+
+/** The points of the marker of that namespace in the last message that adds it; empty without one. */
+std::vector<geometry_msgs::Point> lastPoints(const std::deque<MarkerArray>& messages, const std::string& part)
+{
+  std::vector<geometry_msgs::Point> points;
+  for (const MarkerArray& message : messages)
+  {
+    for (const Marker& marker : message.markers)
+    {
+      points = marker.ns == part && marker.action == Marker::ADD ? marker.points : points;
+    }
+  }
+  return points;
+}
+
 constexpr double STOPS_WITHIN = 0.3 * SLOWDOWN;  // [s]
 
 TEST_F(RoutesTest, FollowsARouteToItsExactEnd)
@@ -33,6 +53,7 @@ TEST_F(RoutesTest, FollowsARouteToItsExactEnd)
   recordHall();
   putAt({ -2.05, 0.05, 0.04 });
   const ros::Time begin = ros::Time::now();
+  const Recorder<MarkerArray> markers("route_follower/markers");
   send("hall");
   const FollowRouteResult final = result();
   ASSERT_TRUE(final.success) << final.message;
@@ -79,6 +100,15 @@ TEST_F(RoutesTest, FollowsARouteToItsExactEnd)
   EXPECT_LT(farthest, 0.15);
   EXPECT_LT(earliest, 0.4) << "a view is left before the base is near it";
   EXPECT_TRUE(waitUntil([this] { return wanted_.last()->view.empty(); }));
+
+  // The route's stops as it saw them in the end, with the base at the last one.
+  const std::vector<geometry_msgs::Point> stops = lastPoints(markers.messages(), "stops");
+  const std::vector<geometry_msgs::Point> driven = lastPoints(markers.messages(), "way_driven");
+  ASSERT_EQ(stops.size(), route.stops.size());
+  ASSERT_FALSE(driven.empty());
+  EXPECT_LT(std::hypot(stops.back().x - driven.back().x, stops.back().y - driven.back().y), 0.02);
+  EXPECT_NEAR(std::hypot(stops.back().x - stops.front().x, stops.back().y - stops.front().y),
+              compose(inverse(route.stops.front().base), route.stops.back().base).distance(), 1e-6);
   std::printf(
       "[ MEASURED ] %.1f mm and %.2f degrees off, at most %.0f mm beside the line and %.0f mm before a view that is "
       "left, %.2f m in %.0f s\n",
@@ -92,7 +122,7 @@ TEST_F(RoutesTest, FollowsAPartOfARouteInReverse)
   const std::string from = route.stops[2].view;
   const PlanarPose on_route = compose(inverse(route.stops.back().base), route.stops[2].base);
   putAt(compose(hall_end, on_route));
-  send("hall", from, route.stops[0].view, true);
+  send("", from, route.stops[0].view, true);  // the route is the one of the view
   const FollowRouteResult final = result();
   ASSERT_TRUE(final.success) << final.message;
   const PlanarPose begin = compose(hall_end, compose(inverse(route.stops.back().base), route.stops[0].base));
@@ -204,7 +234,9 @@ TEST_F(RoutesTest, RefusesBeforeAnythingMoves)
 {
   recordHall();
   send("");
-  expectRefusal("the goal names no route");
+  expectRefusal("the goal names neither a route nor a view on one");
+  send("", "", "desk");
+  expectRefusal("view 'desk' is on no route");
   send("unknown");
   expectRefusal("cannot load route 'unknown': there is none of that name");
   send("hall", "desk");

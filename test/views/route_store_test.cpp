@@ -206,6 +206,24 @@ TEST_F(RouteStoreTest, HasNoneBeforeTheFirstIsSaved)
   EXPECT_FALSE(fs::exists(store_.directory()));
 }
 
+TEST_F(RouteStoreTest, FindsTheRouteThatAViewIsOn)
+{
+  EXPECT_ERROR(store_.routeWith("hall_002"), "view 'hall_002' is on no route");
+  store_.save(makeRoute("hall"));
+  Route lab = makeRoute("lab");
+  lab.stops.push_back(store_.load("hall").stops.front());  // where both begin
+  store_.save(lab);
+  EXPECT_EQ(store_.routeWith("hall_002"), "hall");
+  EXPECT_EQ(store_.routeWith("lab_003"), "lab");
+  EXPECT_ERROR(store_.routeWith("hall_001"),
+               "view 'hall_001' is on route 'hall' and on route 'lab': name the one to follow");
+  store_.rename("lab", "attic");
+  EXPECT_EQ(store_.routeWith("lab_003"), "attic") << "views keep their names";
+  std::ofstream(file("attic")) << "not a route";
+  EXPECT_ERROR(store_.routeWith("lab_003"),
+               "view 'lab_003' is on no route, as far as is known: route 'attic' is damaged");
+}
+
 TEST_F(RouteStoreTest, RefusesWhatCannotBe)
 {
   const Route good = makeRoute("hall");

@@ -41,6 +41,13 @@ std::vector<Parameter> parameters(RouteGuideParams& params);
 std::vector<RouteStop> stopsBetween(const Route& route, const std::string& start, const std::string& goal,
                                     bool reverse);
 
+/** Where a base is at the stops of a route, as far as that is known. */
+struct RoutePlaces
+{
+  std::vector<PlanarPose> stops;  ///< the base's poses at stops that follow each other, in odometry's frame
+  std::size_t index = 0;          ///< in `stops`, of the one that the base drives to
+};
+
 /**
  * Leads a base that homes to one view of a route after another: says when it is time for the next one, and where that
  * is by odometry until it is found. Knows no ROS and no time. Poses are of the base in odometry's frame.
@@ -113,6 +120,12 @@ public:
     double yaw = std::numeric_limits<double>::quiet_NaN();       ///< yaw of the base less the recorded one [rad]
   };
   Deviation deviation(const PlanarPose& base) const;
+
+  /**
+   * Where view() and the stops about it are: view() as it was found, the others beside it as they were recorded.
+   * @param most of stops before view(), and after it. @return no stops while it is not known where view() is.
+   */
+  RoutePlaces places(std::size_t most) const;
 
 private:
   /** @throws std::logic_error when the view is not one of the stops. */

@@ -3,6 +3,7 @@
 #pragma once
 
 #include "view_servo/control/homing.h"
+#include "view_servo/control/route_guide.h"
 #include "view_servo/geometry/camera.h"
 #include "view_servo/geometry/correspondence.h"
 #include "view_servo/tracking/plane_tracker.h"
@@ -34,6 +35,7 @@ namespace view_servo
  * | way_to_go, way_driven | lines on the floor; of an arm, through the air | odometry's |
  * | points | the view's points: green where they support its pose, red where they do not | odometry's |
  * | plane | the view's region on its plane | odometry's |
+ * | route, stops | a line on the floor, and where its views were stored: blue those to come | odometry's |
  */
 
 /** What homing to a view knows. */
@@ -51,9 +53,10 @@ struct HomingScene
   Eigen::Isometry3d base_from_camera = Eigen::Isometry3d::Identity();  ///< the optical frame's pose in base_link
   std::vector<HomingLandmark> landmarks;                               ///< see Homing::landmarks()
   std::vector<Eigen::Vector3d> driven;                                 ///< places of the base, oldest first
+  std::optional<RoutePlaces> route;                                    ///< of a base that follows one
 };
 
-/** Without "plane". */
+/** Without "plane", and without "route" and "stops" where no route is followed. */
 visualization_msgs::MarkerArray toMarkers(const HomingScene& scene);
 
 /** What following a plane knows. */

@@ -6,6 +6,7 @@
 #include "view_servo/control/course.h"
 #include "view_servo/control/homing.h"
 #include "view_servo/control/motion_watch.h"
+#include "view_servo/control/route_guide.h"
 #include "view_servo/control/travelled_way.h"
 #include "view_servo/control/velocity_limiter.h"
 #include "view_servo/ros/base_output.h"
@@ -61,6 +62,7 @@ public:
     std::function<void()> on_image_outcome;  ///< after the work on an image of the task; mutex held
     std::function<void(const HomingOutcome&)> on_work;  ///< after each piece of work, by its thread; not held
     std::function<void(const CameraFrame&)> on_frame_without_task;  ///< by the worker's thread; not held
+    std::function<RoutePlaces()> route = nullptr;  ///< where the route's stops are, for the markers; mutex held
   };
 
   /** References to `context` and `params` are kept. */

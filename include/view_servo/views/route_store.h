@@ -56,6 +56,12 @@ public:
   /** Whether there is a file of that name, damaged or not. */
   bool has(const std::string& name) const;
 
+  /**
+   * The name of the route that a view is on. @throws RouteStoreError when it is on none that can be read, or on
+   * several.
+   */
+  std::string routeWith(const std::string& view) const;
+
   struct Damaged
   {
     std::string name;    ///< of the route
