@@ -1,8 +1,8 @@
 # Copyright (c) 2026, the view_servo authors
 # SPDX-License-Identifier: BSD-3-Clause
 """
-Reads a recorded run along a route and draws it, for plot_run, which imports this file from its own directory. The run is
-known by the feedback of the action follow.
+Reads a recorded run along a route and draws it, for plot_run and report, which import this file from their own directory. The
+run is known by the feedback of the action follow.
 """
 import os
 import textwrap
@@ -161,14 +161,10 @@ def draw_command(axes, run):
     colour_axis(turn, "turn [deg/s]", "C3")
 
 
-def draw_route(run, name):
-    """The figure of a run along a route."""
-    feedback, status, result = run["feedback"], run["status"], run["result"]
-    figure = plt.figure(figsize=(16, 9), constrained_layout=True)
-    left, right = figure.add_gridspec(1, 2, width_ratios=[1.2, 1])
-    draw_path(figure.add_subplot(left), run)
-    panels = [figure.add_subplot(place) for place in right.subgridspec(3, 1)]
-    for axes, draw in zip(panels, (draw_place, draw_share, draw_command)):
+def draw_over_time(panels, draws, run):
+    """One panel above another, each by its own function; a dotted line where the next view's turn begins."""
+    feedback = run["feedback"]
+    for axes, draw in zip(panels, draws):
         draw(axes, run)
         if not axes.axison:
             continue
@@ -177,6 +173,16 @@ def draw_route(run, name):
             axes.axvline(feedback["t"][begin], color="0.3", linewidth=0.8, linestyle=":")
     panels[0].set_title("a dotted line: the next view", fontsize=10)
     panels[-1].set_xlabel("time since the first feedback [s]")
+
+
+def draw_route(run, name):
+    """The figure of a run along a route."""
+    feedback, status, result = run["feedback"], run["status"], run["result"]
+    figure = plt.figure(figsize=(16, 9), constrained_layout=True)
+    left, right = figure.add_gridspec(1, 2, width_ratios=[1.2, 1])
+    draw_path(figure.add_subplot(left), run)
+    panels = [figure.add_subplot(place) for place in right.subgridspec(3, 1)]
+    draw_over_time(panels, (draw_place, draw_share, draw_command), run)
 
     title = f"{name}, {os.path.dirname(run['topic']) or run['topic']}: {duration(feedback):.1f} s"
     title += f", {len(legs_of(feedback))} views"

@@ -36,8 +36,8 @@ from nav_msgs.msg import Odometry  # noqa: E402
 from rosgraph_msgs.msg import Log  # noqa: E402
 from sensor_msgs.msg import CompressedImage, Image  # noqa: E402
 from std_msgs.msg import String  # noqa: E402
-from view_servo.msg import (Heading, HomeToViewActionResult, Homography, PointMatch, PointMatches, ServoError,  # noqa: E402
-                            ServoStatus)
+from view_servo.msg import (FollowRouteActionFeedback, FollowRouteActionResult, Heading, HomeToViewActionResult,  # noqa: E402
+                            Homography, PointMatch, PointMatches, ServoError, ServoStatus)
 
 BEGIN = 1700000000.0
 DURATION = 4.0
@@ -302,6 +302,26 @@ class Report(unittest.TestCase):
         self.assertNotIn("there is no path", page.texts["path"])
         self.assertIn("12 of 16 matches of points agree", page.texts["pictures"])
         self.assertIn("last image that has matches, 0.30 s before the last of all, at 3.90 s", page.texts["pictures"])
+
+    def test_route(self):
+        messages = [each for each in homing_messages() + more_messages() if each[0] != "/home/result"]
+        for i in range(40):
+            feedback = stamped(FollowRouteActionFeedback(), 0.1 * i)
+            feedback.feedback.view = f"hall_{1 + i // 10:03d}"
+            feedback.feedback.share, feedback.feedback.yaw = 0.8, 0.01
+            feedback.feedback.sideways = math.nan if i < 5 else -0.001 * i
+            messages.append(("/follow/feedback", feedback, 0.1 * i))
+        result = stamped(FollowRouteActionResult(), DURATION + 0.1)
+        result.result.message, result.result.duration, result.result.travelled = "view 'hall_004', 4 of 5: lost", 3.9, 1.25
+        _, content, page = self.page(messages + [("/follow/result", result, DURATION + 0.1)])
+        self.assertEqual(page.texts["verdict"].strip(), "not arrived view 'hall_004', 4 of 5: lost")
+        numbers = dict(page.rows(content, "numbers"))
+        self.assertEqual(numbers["views of the route that it drove to"], "4, from hall_001 to hall_004")
+        self.assertEqual(numbers["farthest beside the recorded way, by its views"], "39.0 mm")
+        self.assertEqual(numbers["travelled, by odometry"], "1.25 m")
+        plots = [attributes for tag, attributes in page.tags if tag == "svg" and attributes.get("class") == "plot"]
+        self.assertEqual([plot["aria-label"].split(" ")[0] for plot in plots], ["path", "similarity,", "place"])
+        self.assertIn("hall_002", page.texts["path"])
 
     def test_arm_with_the_view_from_the_directory(self):
         PIL.Image.fromarray(picture()).save(os.path.join(self.directory, "shelf.00.png"))
