@@ -25,7 +25,7 @@ _view_servo_view()
   local command=${COMP_WORDS[$1 + 1]:-} options="--help --patience" index word count=0 remappings=()
   COMPREPLY=()
   if ((COMP_CWORD == $1 + 1)); then
-    mapfile -t COMPREPLY < <(compgen -W "list save show delete go stop watch --help" -- "$current")
+    mapfile -t COMPREPLY < <(compgen -W "list save show delete go record follow stop watch --help" -- "$current")
     return
   fi
   case $command in
@@ -33,9 +33,17 @@ _view_servo_view()
     save) options+=" --overwrite --learn --roi --file" ;;
     show) options+=" --out" ;;
     go) options+=" --timeout --enable --driver --approach" ;;
-    delete | stop | watch) ;;
+    follow) options+=" --timeout --enable --from --to --reverse" ;;
+    record | delete | stop | watch) ;;
     *) return ;;
   esac
+  # Bash takes a:=b apart into three words.
+  for ((index = $1 + 2; index < ${#COMP_WORDS[@]}; ++index)); do
+    word=${COMP_WORDS[index]}
+    case $word in
+      := | *:=*) remappings+=("${COMP_WORDS[index - 1]}:=${COMP_WORDS[index + 1]:-}") ;;
+    esac
+  done
   case $previous in
     --file | --out)
       compopt -o filenames 2> /dev/null  # fails when this is called by hand, which does no harm
@@ -43,7 +51,11 @@ _view_servo_view()
       return
       ;;
     --driver)
-      mapfile -t COMPREPLY < <(compgen -W "homing servo_25d" -- "$current")
+      mapfile -t COMPREPLY < <(compgen -W "homing servo_25d route_follower" -- "$current")
+      return
+      ;;
+    --from | --to)
+      mapfile -t COMPREPLY < <(compgen -W "$(_view_servo_names "${remappings[@]}")" -- "$current")
       return
       ;;
     --timeout | --patience | --roi | --approach) return ;;
@@ -52,13 +64,6 @@ _view_servo_view()
     mapfile -t COMPREPLY < <(compgen -W "$options" -- "$current")
     return
   fi
-  # Bash takes a:=b apart into three words.
-  for ((index = $1 + 2; index < ${#COMP_WORDS[@]}; ++index)); do
-    word=${COMP_WORDS[index]}
-    case $word in
-      := | *:=*) remappings+=("${COMP_WORDS[index - 1]}:=${COMP_WORDS[index + 1]:-}") ;;
-    esac
-  done
   # A view's name is the first word that is neither an option nor what belongs to one.
   for ((index = $1 + 2; index < COMP_CWORD; ++index)); do
     case ${COMP_WORDS[index]} in

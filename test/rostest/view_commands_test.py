@@ -30,9 +30,10 @@ import actionlib  # noqa: E402
 import PIL.Image  # noqa: E402
 import rospy  # noqa: E402
 from geometry_msgs.msg import PoseStamped  # noqa: E402
-from std_srvs.srv import SetBool, SetBoolResponse  # noqa: E402
+from std_srvs.srv import SetBool, SetBoolResponse, Trigger, TriggerResponse  # noqa: E402
 from view_servo.msg import (FollowRouteAction, FollowRouteResult, HomeToViewAction, HomeToViewResult, ServoStatus,  # noqa: E402
                             ServoToViewAction, ServoToViewResult)
+from view_servo.srv import StartRoute, StartRouteResponse  # noqa: E402
 
 sys.dont_write_bytecode = True
 loader = importlib.machinery.SourceFileLoader("view", os.path.join(ROOT, "scripts", "view"))
@@ -221,7 +222,7 @@ class ViewCommands(graph.GraphTest):
         for command, space, complaint in (
                 ("list --patience 0.3", "/hanging", "/hanging/view_store/list does not answer within 0.3 s"),
                 ("list", "/dead", "/dead/view_store/list cannot be called"),
-                ("go x", "/empty", "nobody serves the actions /empty/home and /empty/servo; there is one in /.* and in /base: set"),
+                ("go x", "/empty", "nobody serves the actions /empty/home, /empty/servo and /empty/follow; there is one in /.* and in /base: set"),
                 ("stop", "/empty", "no driver runs"),
                 ("list", "/empty", "there is no /empty/view_store/list; there is one in /")):
             self.view_here(command, CANNOT, complaint, ROS_NAMESPACE=space)
@@ -319,6 +320,56 @@ class ViewCommands(graph.GraphTest):
         self.assertEqual(self.homing.goals, [])
         self.view("go hall dock --driver homing")
         self.assertEqual((self.homing.goals[-1].view, self.homing.goals[-1].views), ("", ["hall", "dock"]))
+
+    def test_follow(self):
+        out = self.view("follow hall --from hall_002 --to hall_007 --reverse --timeout 9 --enable")
+        self.assertIn("to follow route 'hall' from 'hall_002' to 'hall_007' backwards; Ctrl-C stops it", out)
+        goal = self.follower.goals[-1]
+        self.assertEqual((goal.route, goal.start, goal.goal, goal.reverse, goal.timeout), ("hall", "hall_002", "hall_007", True, 9.0))
+        self.assertEqual((self.follower.enabled, self.homing.goals, self.homing.enabled), (True, [], None))
+        self.follower.behaviour = "refuse"
+        self.view("follow hall", NOT_DONE, "the gate of .* is closed.*; type: view follow hall --enable")
+        self.assertEqual((self.follower.goals[-1].start, self.follower.goals[-1].reverse), ("", False))
+        self.follower.behaviour = "arrive"
+        self.view("go hall_003 --driver route_follower")  # along its route
+        self.assertEqual((self.follower.goals[-1].route, self.follower.goals[-1].goal, self.homing.goals), ("", "hall_003", []))
+        self.view_here("go hall_001 hall_003 --driver route_follower", CANNOT, "goes to one view, along the route")
+        self.follower.behaviour, process = "drive", self.begin("follow", "hall")
+        self.follower.came.clear()
+        self.assertTrue(self.follower.came.wait(PATIENCE))
+        process.send_signal(signal.SIGINT)
+        self.end(process, NOT_DONE, "not arrived: the goal was cancelled")
+        self.view_here("follow hall", CANNOT, "nobody serves the action /empty/follow; there is one in /", ROS_NAMESPACE="/empty")
+
+    def test_record(self):
+        calls = []
+
+        def start(request):
+            calls.append(request.name)
+            return StartRouteResponse(request.name != "odd", "route '%s' is recorded" % request.name)
+
+        def stop(_):
+            calls.append("stop")
+            return TriggerResponse(calls[-2] != "short", "stored it" if calls[-2] != "short" else "not stored: one view only")
+
+        self.view_here("record hall", CANNOT, "there is no /route_recorder/start: start route_recorder, by roslaunch")
+        services = [rospy.Service("route_recorder/start", StartRoute, start), rospy.Service("route_recorder/stop", Trigger, stop)]
+        try:
+            self.view_here("record odd", NOT_DONE, "route 'odd' is recorded")
+            self.assertEqual(calls, ["odd"])
+            for name, status, complaint in (("hall", DONE, None), ("short", NOT_DONE, "not stored: one view only")):
+                process = self.begin("record", name)
+                self.lines_until(process, "press Ctrl-C")
+                self.assertEqual(calls[-1], name)
+                process.send_signal(signal.SIGINT)
+                self.assertEqual(self.end(process, status, complaint), "stored it\n" if status == DONE else "")
+                self.assertEqual(calls[-2:], [name, "stop"])
+            process = self.begin("record", "hall")
+            self.lines_until(process, "press Ctrl-C")
+        finally:
+            for service in services:
+                service.shutdown()
+        self.end(process, NOT_DONE, "the recorder has gone")
 
     def test_stop(self):
         self.homing.behaviour = self.arm.behaviour = "drive"

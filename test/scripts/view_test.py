@@ -19,7 +19,7 @@ import unittest
 
 ROOT = os.path.realpath(os.path.join(os.path.dirname(os.path.abspath(__file__)), "..", ".."))
 COMPLETION = os.path.join(ROOT, "scripts", "completion.bash")
-COMMANDS = ["list", "save", "show", "delete", "go", "stop", "watch"]
+COMMANDS = ["list", "save", "show", "delete", "go", "record", "follow", "stop", "watch"]
 
 sys.dont_write_bytecode = True
 loader = importlib.machinery.SourceFileLoader("view", os.path.join(ROOT, "scripts", "view"))
@@ -50,12 +50,19 @@ class Arguments(unittest.TestCase):
                          (["dock"], 2.5, True, "homing", 3.0))
         options = parse("go", "above", "shelf", "--approach", "0.01", "0.05", "--enable")
         self.assertEqual((options.names, options.approach, options.enable), (["above", "shelf"], [0.01, 0.05], True))
+        options = parse("follow", "hall", "--from", "hall_002", "--to", "hall_007", "--reverse", "--timeout", "90")
+        self.assertEqual((options.route, options.begin, options.end, options.reverse, options.timeout, options.enable),
+                         ("hall", "hall_002", "hall_007", True, 90.0, False))
+        self.assertEqual(parse("record", "hall").route, "hall")
 
     def test_bad(self):
         for words, complaint in (
                 ([], "a command is missing"),
                 (["fly"], "invalid choice: 'fly'"),
                 (["go"], "required: NAME"),
+                (["follow"], "required: ROUTE"),
+                (["follow", "hall", "lab"], "unrecognized arguments: lab"),
+                (["record", "hall", "--enable"], "unrecognized arguments: --enable"),
                 (["go", "dock", "--timeout", "0"], "0 is not a time"),
                 (["go", "dock", "--timeout", "nan"], "nan is not a time"),
                 (["go", "dock", "--timeout", "soon"], "invalid positive value: 'soon'"),
@@ -227,18 +234,19 @@ class Completion(unittest.TestCase):
             known = set(re.findall(r"--[a-z]+", parse(command, "--help")[1].split("    rosrun view_servo")[0]))
             self.assertEqual(set(self.complete("view_servo", "view", command, "-")), known)
         self.assertEqual(self.complete("view_servo", "view", "go", "dock", "--driver", ""),
-                         [kind.name for kind in view.DRIVER_KINDS if kind.goes_to_views])
+                         [kind.name for kind in view.DRIVER_KINDS])
 
     def test_views(self):
         for words in (["go"], ["go", "dock"], ["go", "--approach", "0.01", "0.03", "dock"], ["show"], ["delete"],
-                      ["go", "--enable"], ["go", "--timeout", "3"], ["save", "--overwrite"],
+                      ["go", "--enable"], ["go", "--timeout", "3"], ["follow", "hall", "--from"], ["follow", "hall", "--to"], ["save", "--overwrite"],
                       ["save", "--overwrite", "--roi", "1", "2", "3", "4"]):
             with self.subTest(words=words):
                 self.assertEqual(self.complete("view_servo", "view", *words, ""), ["dock", "shelf"])
         self.assertEqual(self.complete("view_servo", "view", "go", "sh"), ["shelf"])
         self.assertEqual(self.complete("view_servo", "view", "go", "__ns", ":=", "/robot1", ""), ["attic"])
+        self.assertEqual(self.complete("view_servo", "view", "follow", "__ns", ":=", "/robot1", "hall", "--to", ""), ["attic"])
         for words in (["save", ""], ["show", "dock", ""], ["list", ""], ["stop", ""], ["go", "--timeout", ""],
-                      ["go", "--approach", ""], ["go", "--approach", "0.01", ""],
+                      ["record", ""], ["follow", ""], ["go", "--approach", ""], ["go", "--approach", "0.01", ""],
                       ["save", "--overwrite", "--roi", "1", ""], ["fly", ""]):
             with self.subTest(words=words):
                 self.assertEqual(self.complete("view_servo", "view", *words), [])
