@@ -8,6 +8,7 @@
 #include "view_servo/ros/conversions.h"
 #include "view_servo/ros/node_base.h"
 
+#include <ros/message_event.h>
 #include <ros/transport_hints.h>
 
 #include <algorithm>
@@ -28,10 +29,10 @@ ros::Subscriber listen(const ros::NodeHandle& nh, const std::string& topic, Hand
 {
   constexpr std::uint32_t QUEUE_SIZE = 50;
   ros::NodeHandle topics_nh(nh);
-  const boost::function<void(const boost::shared_ptr<const Message>&)> callback =
-      [topic, handler](const boost::shared_ptr<const Message>& message) {
-        guarded("a message on '" + topic + "'", [&] { handler(*message); });
-      };
+  using Event = ros::MessageEvent<const Message>;
+  const boost::function<void(const Event&)> callback = [topic, handler](const Event& event) {
+    guarded("a message on '" + topic + "'", [&] { handler(event); });
+  };
   return topics_nh.subscribe<Message>(topic, QUEUE_SIZE, callback, ros::VoidConstPtr(),
                                       ros::TransportHints().tcpNoDelay());
 }
@@ -51,11 +52,12 @@ OdometryListener::OdometryListener(const ros::NodeHandle& nh, const Setup& setup
     history_(HISTORY),
     last_time_(-std::numeric_limits<double>::infinity())
 {
-  subscriber_ = listen<nav_msgs::Odometry>(nh, topic_, [this](const nav_msgs::Odometry& m) { onOdometry(m); });
+  subscriber_ = listen<nav_msgs::Odometry>(nh, topic_, [this](const OdometryReader::Event& e) { onOdometry(e); });
 }
 
-void OdometryListener::onOdometry(const nav_msgs::Odometry& message)
+void OdometryListener::onOdometry(const OdometryReader::Event& event)
 {
+  const nav_msgs::Odometry& message = *event.getConstMessage();
   const std::lock_guard<std::mutex> lock(mutex_);
   const ros::Time& stamp = message.header.stamp;
   const DriverInput::Stamp place = stamps_.checkStamp(stamp.isZero() ? stamp : toStamp(stamp.toSec() - delay_));
@@ -64,7 +66,7 @@ void OdometryListener::onOdometry(const nav_msgs::Odometry& message)
   child_frame_ = message.child_frame_id;
   meter_.add(steadySeconds(), ageOf(stamp), place == DriverInput::Stamp::LATE);
   compareClocks();
-  const std::optional<OdometryReading> reading = reader_.read(message, subscriber_.getNumPublishers());
+  const std::optional<OdometryReading> reading = reader_.read(event);
   fault_ = reading || !stamp_fault_.empty() ? "" : input_.problem();
   if (reading)
   {
@@ -148,7 +150,9 @@ JointListener::JointListener(const ros::NodeHandle& nh, const Setup& setup)
     following_(mimicJoints(robotDescription(nh))),
     guard_(jointLimits(robotDescription(nh)), 0.0, 1.0)
 {
-  subscriber_ = listen<sensor_msgs::JointState>(nh, topic_, [this](const sensor_msgs::JointState& m) { onJoints(m); });
+  subscriber_ = listen<sensor_msgs::JointState>(
+      nh, topic_,
+      [this](const ros::MessageEvent<const sensor_msgs::JointState>& e) { onJoints(*e.getConstMessage()); });
 }
 
 void JointListener::onJoints(const sensor_msgs::JointState& message)

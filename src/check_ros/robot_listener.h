@@ -48,7 +48,7 @@ public:
   std::string adviceOn(double remaining);
 
 private:
-  void onOdometry(const nav_msgs::Odometry& message);
+  void onOdometry(const OdometryReader::Event& event);
   /** Compares the newest stamps of odometry and images. The mutex is held. */
   void compareClocks();
 

@@ -8,6 +8,7 @@
 #include "view_servo/ros/node_base.h"
 
 #include <cmath>
+#include <iterator>
 #include <utility>
 
 namespace view_servo
@@ -18,7 +19,19 @@ OdometryReader::OdometryReader(DriverInput& input, const TransformSource& transf
 {
 }
 
-std::string OdometryReader::faultOf(const nav_msgs::Odometry& message, const PlanarPose& pose, std::uint32_t publishers)
+std::size_t OdometryReader::countPublishers(const std::string& publisher)
+{
+  constexpr std::chrono::seconds LATELY(1);
+  const Clock::time_point now = Clock::now();
+  publishers_[publisher] = now;
+  for (auto other = publishers_.begin(); other != publishers_.end();)
+  {
+    other = now - other->second > LATELY ? publishers_.erase(other) : std::next(other);
+  }
+  return publishers_.size();
+}
+
+std::string OdometryReader::faultOf(const nav_msgs::Odometry& message, const PlanarPose& pose, std::size_t publishers)
 {
   constexpr double FARTHEST = 1e6;  // [m]
   const std::string name = "odometry on " + input_.topics();
@@ -54,10 +67,11 @@ std::string OdometryReader::faultOf(const nav_msgs::Odometry& message, const Pla
   return "";
 }
 
-std::optional<OdometryReading> OdometryReader::read(const nav_msgs::Odometry& message, std::uint32_t publishers)
+std::optional<OdometryReading> OdometryReader::read(const Event& event)
 {
+  const nav_msgs::Odometry& message = *event.getConstMessage();
   const PlanarPose child_pose = toPlanarPose(message);
-  const std::string fault = faultOf(message, child_pose, publishers);
+  const std::string fault = faultOf(message, child_pose, countPublishers(event.getPublisherName()));
   if (!fault.empty())
   {
     input_.reject(fault);
@@ -96,12 +110,10 @@ std::string OdometryReader::adviceOnDelay() const
 }
 
 OdometryInput::OdometryInput(DriverContext& context, const TransformSource& transforms, const std::string& base_frame,
-                             double timeout, double delay,
-                             const std::function<void(const nav_msgs::Odometry&)>& on_message)
-  : OdometryReader(context.addInput("odometry", context.quoted("odom"), timeout), transforms, base_frame, delay),
-    subscriber_(context.listen<nav_msgs::Odometry>(
-        "odom", 50, [on_message](const nav_msgs::Odometry::ConstPtr& message) { on_message(*message); }))
+                             double timeout, double delay, const std::function<void(const Event&)>& on_message)
+  : OdometryReader(context.addInput("odometry", context.quoted("odom"), timeout), transforms, base_frame, delay)
 {
+  context.listenEvents<nav_msgs::Odometry>("odom", 50, on_message);
 }
 
 }  // namespace view_servo

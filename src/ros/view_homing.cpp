@@ -42,7 +42,7 @@ ViewHoming::ViewHoming(DriverContext& context, const HomingDriverParams& params,
                                OUTCOME_PATIENCE * params.image_timeout)),
     transforms_(context.nodeHandle()),
     odometry_(context, transforms_, base_frame_, params.odometry_timeout, params.odometry_delay,
-              [this](const nav_msgs::Odometry& message) { onOdometry(message); }),
+              [this](const OdometryInput::Event& event) { onOdometry(event); }),
     matches_(context.addInput("matches", context.quoted("point_matches") + " or " + context.quoted("line_matches"),
                               params.match_timeout)),
     points_("matches", context.resolved("point_matches")),
@@ -258,9 +258,9 @@ void ViewHoming::onFrame(const CameraFrame& frame)
   worker_.addFrame(frame);
 }
 
-void ViewHoming::onOdometry(const nav_msgs::Odometry& message)
+void ViewHoming::onOdometry(const OdometryInput::Event& event)
 {
-  const std::optional<OdometryReading> reading = odometry_.read(message);
+  const std::optional<OdometryReading> reading = odometry_.read(event);
   endIfTimeWentBack(odometry_.input());
   if (!reading)
   {

@@ -205,11 +205,20 @@ public:
   template <typename Message, typename Handler>
   ros::Subscriber listen(const std::string& topic, std::uint32_t queue_size, Handler handler)
   {
+    return listenEvents<Message>(topic, queue_size, [handler](const ros::MessageEvent<const Message>& event) {
+      handler(event.getConstMessage());
+    });
+  }
+
+  /** Likewise. @param handler is called with a const ros::MessageEvent<const Message>&, which names the publisher. */
+  template <typename Message, typename Handler>
+  ros::Subscriber listenEvents(const std::string& topic, std::uint32_t queue_size, Handler handler)
+  {
     const std::string what = "a message on '" + resolved(topic) + "'";
-    subscribers_.push_back(subscribe<Message>(
+    subscribers_.push_back(subscribeEvents<Message>(
         topic, queue_size,
-        [this, what, handler](const typename Message::ConstPtr& message) {
-          runLocked(what, [&] { handler(message); });
+        [this, what, handler](const ros::MessageEvent<const Message>& event) {
+          runLocked(what, [&] { handler(event); });
         },
         ros::TransportHints().tcpNoDelay()));
     return subscribers_.back();

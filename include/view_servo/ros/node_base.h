@@ -182,9 +182,19 @@ protected:
   ros::Subscriber subscribe(const std::string& topic, std::uint32_t queue_size, Handler handler,
                             const ros::TransportHints& hints = ros::TransportHints())
   {
-    using Pointer = boost::shared_ptr<const Message>;
-    const boost::function<void(const Pointer&)> callback = [topic, handler](const Pointer& message) {
-      guarded("a message on '" + topic + "'", [&] { handler(message); });
+    return subscribeEvents<Message>(
+        topic, queue_size,
+        [handler](const ros::MessageEvent<const Message>& event) { handler(event.getConstMessage()); }, hints);
+  }
+
+  /** Likewise. @param handler is called with a const ros::MessageEvent<const Message>&, which names the publisher. */
+  template <typename Message, typename Handler>
+  ros::Subscriber subscribeEvents(const std::string& topic, std::uint32_t queue_size, Handler handler,
+                                  const ros::TransportHints& hints = ros::TransportHints())
+  {
+    using Event = ros::MessageEvent<const Message>;
+    const boost::function<void(const Event&)> callback = [topic, handler](const Event& event) {
+      guarded("a message on '" + topic + "'", [&] { handler(event); });
     };
     return nh_.subscribe<Message>(topic, queue_size, callback, ros::VoidConstPtr(), hints);
   }

@@ -7,12 +7,14 @@
 #include "view_servo/ros/transform_source.h"
 
 #include <nav_msgs/Odometry.h>
-#include <ros/subscriber.h>
+#include <ros/message_event.h>
 #include <ros/time.h>
 
-#include <cstdint>
+#include <chrono>
+#include <cstddef>
 #include <functional>
 #include <limits>
+#include <map>
 #include <optional>
 #include <string>
 
@@ -41,8 +43,11 @@ public:
    */
   OdometryReader(DriverInput& input, const TransformSource& transforms, std::string base_frame, double delay);
 
-  /** @param publishers number of nodes that publish odometry. @return empty when the message was rejected. */
-  std::optional<OdometryReading> read(const nav_msgs::Odometry& message, std::uint32_t publishers);
+  /** A message as it has come. */
+  using Event = ros::MessageEvent<const nav_msgs::Odometry>;
+
+  /** @return empty when the message was rejected. */
+  std::optional<OdometryReading> read(const Event& event);
 
   const DriverInput& input() const
   {
@@ -72,13 +77,21 @@ public:
   std::string adviceOnDelay() const;
 
 private:
-  std::string faultOf(const nav_msgs::Odometry& message, const PlanarPose& pose, std::uint32_t publishers);
+  using Clock = std::chrono::steady_clock;
+
+  /**
+   * Number of nodes that have published lately, this one included. roscpp is not asked: its answer waits while it talks
+   * to the master, which may take for ever.
+   */
+  std::size_t countPublishers(const std::string& publisher);
+  std::string faultOf(const nav_msgs::Odometry& message, const PlanarPose& pose, std::size_t publishers);
 
   DriverInput& input_;
   const TransformSource& transforms_;
   const std::string base_frame_;
   const double delay_;
   double measured_delay_ = std::numeric_limits<double>::quiet_NaN();
+  std::map<std::string, Clock::time_point> publishers_;  // by name, and when they were heard last
   std::string frame_;
   std::string child_frame_;                  // the frame whose pose odometry gives
   std::optional<PlanarPose> base_in_child_;  // pose of ~base_frame in child_frame_; empty until tf knows it
@@ -93,16 +106,7 @@ public:
    * @param on_message is called with each message, by runLocked(), and has to call read().
    */
   OdometryInput(DriverContext& context, const TransformSource& transforms, const std::string& base_frame,
-                double timeout, double delay, const std::function<void(const nav_msgs::Odometry&)>& on_message);
-
-  /** @return empty when the message was rejected. */
-  std::optional<OdometryReading> read(const nav_msgs::Odometry& message)
-  {
-    return OdometryReader::read(message, subscriber_.getNumPublishers());
-  }
-
-private:
-  ros::Subscriber subscriber_;
+                double timeout, double delay, const std::function<void(const Event&)>& on_message);
 };
 
 }  // namespace view_servo

@@ -168,7 +168,7 @@ private:
   void endIfTimeWentBack(const DriverInput& input);
   void endIfStampsAreApart();
   void onFrame(const CameraFrame& frame);
-  void onOdometry(const nav_msgs::Odometry& message);
+  void onOdometry(const OdometryInput::Event& event);
   void onMatches(bool wanted, const std_msgs::Header& header, const std::vector<PointMatch>& matches);
   void onOutcome(const HomingOutcome& outcome);
   /** Publishes what is known as markers, if somebody wants them. By the worker's thread, without the mutex. */
