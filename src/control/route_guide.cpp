@@ -60,6 +60,15 @@ std::vector<RouteStop> stopsBetween(const Route& route, const std::string& start
   return { first, last + 1 };
 }
 
+bool comesByAgain(const std::vector<RouteStop>& stops, std::size_t at, std::size_t other)
+{
+  constexpr double NEAR = 0.5;   // [m]
+  constexpr double ALIKE = 0.5;  // [rad]
+  constexpr std::size_t ELSEWHERE = 3;
+  const PlanarPose way = relative(stops[at], stops[other]);
+  return std::max(at, other) - std::min(at, other) >= ELSEWHERE && way.distance() < NEAR && std::abs(way.yaw) < ALIKE;
+}
+
 RouteGuide::RouteGuide(const RouteGuideParams& params, std::vector<RouteStop> stops, double blind_speed)
   : params_(params), stops_(std::move(stops)), blind_speed_(blind_speed)
 {
@@ -145,7 +154,7 @@ std::size_t RouteGuide::indexOf(const std::string& view) const
 bool RouteGuide::mayJumpTo(const std::string& view) const
 {
   const std::size_t index = indexOf(view);
-  return index > index_ || (index < index_ && left_.count(index_) == 0);
+  return (index > index_ || (index < index_ && left_.count(index_) == 0)) && !comesByAgain(stops_, index_, index);
 }
 
 void RouteGuide::jumpTo(const std::string& view)

@@ -103,7 +103,7 @@ public:
       beginWhereTheBaseIs(task->stops);
     }
     const std::string& view = task->stops.front().view;
-    const LearntView stored = loadLearntView(homing_.viewStore(), view);
+    const LearntView stored = loadStop(task->stops.front());
     task->frame = homing_.waitForInputs(view);
     task->first = homing_.makeTask(stored, task->frame, params_.homing);
     homing_.waitForAnswer();
@@ -187,9 +187,22 @@ private:
   struct Order
   {
     std::string goal;  ///< id of the goal that it is for
-    std::string view;
+    RouteStop stop;
     CameraFrame frame;
   };
+
+  /** @throws std::runtime_error also when the view is not the one that was recorded. */
+  LearntView loadStop(const RouteStop& stop) const
+  {
+    constexpr double SAME = 1e-3;  // [s]
+    LearntView learnt = loadLearntView(homing_.viewStore(), stop.view);
+    if (!(std::abs(learnt.view.stamp - stop.stamp) < SAME))
+    {
+      throw std::runtime_error("view '" + stop.view +
+                               "' has been stored anew since the route was recorded: record the route anew");
+    }
+    return learnt;
+  }
 
   /** The first verified view of a recognizer's answer that is one of the stops; empty: none. */
   static std::string seenOf(const std::vector<RouteStop>& stops, const RecognizedViews& message)
@@ -205,16 +218,6 @@ private:
       }
     }
     return "";
-  }
-
-  /** Whether a stop is about where the route begins, after it has been elsewhere: then the whole route is meant. */
-  static bool closesALoop(const std::vector<RouteStop>& stops, std::ptrdiff_t index)
-  {
-    constexpr double NEAR = 0.5;   // [m]
-    constexpr double ALIKE = 0.5;  // [rad]
-    constexpr std::ptrdiff_t ELSEWHERE = 3;
-    const PlanarPose way = compose(inverse(stops.front().base), stops[static_cast<std::size_t>(index)].base);
-    return index >= ELSEWHERE && way.distance() < NEAR && std::abs(way.yaw) < ALIKE;
   }
 
   /**
@@ -269,7 +272,7 @@ private:
     {
       const auto stop =
           std::find_if(stops.begin(), stops.end(), [&](const RouteStop& other) { return other.view == view; });
-      if (closesALoop(stops, stop - stops.begin()))
+      if (comesByAgain(stops, 0, static_cast<std::size_t>(stop - stops.begin())))
       {
         ROS_INFO_STREAM("view '" << view << "', which the recognizer sees, is where the route begins, too");
         return;
@@ -284,7 +287,17 @@ private:
    */
   std::optional<Course> blindCourse() const
   {
-    return guide_ && params_.homing.approach.base == BaseKind::HOLONOMIC ? guide_->blindCourse() : std::nullopt;
+    if (!guide_ || params_.homing.approach.base != BaseKind::HOLONOMIC)
+    {
+      return std::nullopt;
+    }
+    std::optional<Course> course = guide_->blindCourse();
+    if (course)
+    {
+      course->gain = params_.homing.approach.gain;
+      course->turn_gain = params_.homing.approach.turn_gain;
+    }
+    return course;
   }
 
   void orderNext()
@@ -300,7 +313,9 @@ private:
     jumps_ = jumps;
     if (!view.empty())
     {
-      worker_.put([&](Order& order) { order = { context_.goalId(), view, frame_ }; });
+      const auto stop =
+          std::find_if(stops_.begin(), stops_.end(), [&](const RouteStop& other) { return other.view == view; });
+      worker_.put([&](Order& order) { order = { context_.goalId(), *stop, frame_ }; });
     }
   }
 
@@ -308,11 +323,11 @@ private:
   void load(const Order& order)
   {
     std::shared_ptr<HomingTask> task;
-    const std::string fault = guarded("reading view '" + order.view + "'", [&] {
-      task = homing_.makeTask(loadLearntView(homing_.viewStore(), order.view), order.frame, params_.homing);
+    const std::string fault = guarded("reading view '" + order.stop.view + "'", [&] {
+      task = homing_.makeTask(loadStop(order.stop), order.frame, params_.homing);
     });
     context_.locked([&] {
-      if (!guide_ || context_.goalId() != order.goal || ordered_ != order.view)
+      if (!guide_ || context_.goalId() != order.goal || ordered_ != order.stop.view)
       {
         return;
       }
@@ -320,7 +335,7 @@ private:
       {
         context_.abort("the route cannot go on: " + fault);
       }
-      else if (order.view == guide_->next() && !jumps_)
+      else if (order.stop.view == guide_->next() && !jumps_)
       {
         next_ = task;
       }
@@ -330,7 +345,7 @@ private:
       }
       else
       {
-        guide_->jumpTo(order.view);
+        guide_->jumpTo(order.stop.view);
         driveTo(task);
       }
     });

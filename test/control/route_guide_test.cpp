@@ -6,6 +6,8 @@
 
 #include <cmath>
 #include <stdexcept>
+#include <string>
+#include <vector>
 
 namespace view_servo
 {
@@ -215,6 +217,26 @@ TEST(RouteGuide, GoesBackOnlyOnceForAViewThatIsNotFound)
   EXPECT_TRUE(guide.mayJumpTo("c")) << "farther on";
   guide.addReport(trackedReport(at_a, at_a, true), at_a);  // b is found after all
   EXPECT_TRUE(guide.mayJumpTo("a"));
+}
+
+TEST(RouteGuide, DoesNotTakeTheEndOfALoopForItsBeginning)
+{
+  std::vector<RouteStop> loop;
+  for (int i = 0; i <= 8; ++i)
+  {
+    const double angle = i * M_PI / 4.0;  // a circle of 1 m, along which the base looks
+    loop.push_back(
+        { std::string(1, static_cast<char>('a' + i)), { std::sin(angle), 1.0 - std::cos(angle), angle }, 0 });
+  }
+  RouteGuide guide(RouteGuideParams(), loop, 0.1);
+  EXPECT_TRUE(comesByAgain(loop, 0, 8));
+  EXPECT_FALSE(comesByAgain(loop, 0, 4)) << "it looks the other way there";
+  EXPECT_FALSE(comesByAgain(loop, 0, 1));
+  EXPECT_FALSE(guide.mayJumpTo("i")) << "the loop has not been driven";
+  EXPECT_TRUE(guide.mayJumpTo("h"));
+  guide.jumpTo("h");
+  guide.goOn();
+  EXPECT_FALSE(guide.mayJumpTo("a")) << "it would be driven once more";
 }
 
 TEST(RouteGuide, SaysHowTheBaseIsPlacedOnTheLine)

@@ -41,6 +41,12 @@ std::vector<Parameter> parameters(RouteGuideParams& params);
 std::vector<RouteStop> stopsBetween(const Route& route, const std::string& start, const std::string& goal,
                                     bool reverse);
 
+/**
+ * Whether a stop is where the way has been before or comes to later, after it has been elsewhere, as at the ends of a
+ * loop: a picture does not tell which of them is meant.
+ */
+bool comesByAgain(const std::vector<RouteStop>& stops, std::size_t at, std::size_t other);
+
 /** Where a base is at the stops of a route, as far as that is known. */
 struct RoutePlaces
 {
@@ -100,8 +106,9 @@ public:
   /** From now on the next view is homed to. There has to be one. */
   void goOn();
   /**
-   * Whether the base may go on at `view` instead of view(), which is not found: at another one, and at an earlier one
-   * only once for each view() until that is found, as it may be there no more.
+   * Whether the base may go on at `view` instead of view(), which is not found: at another one, but not where the way
+   * comes by again (see comesByAgain()), and at an earlier one only once for each view() until that is found, as it may
+   * be there no more.
    */
   bool mayJumpTo(const std::string& view) const;
   /** From now on `view` is homed to, which has to be one of the stops; nothing is known yet of where it is. */
