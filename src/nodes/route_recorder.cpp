@@ -60,7 +60,7 @@ public:
       camera_(nh, private_nh, params_.camera, [this](const CameraFrame& frame) { onFrame(frame); })
   {
     odometry_subscriber_ =
-        subscribe<nav_msgs::Odometry>("odom", 10, [this](const nav_msgs::Odometry::ConstPtr& m) { onOdometry(*m); });
+        subscribeEvents<nav_msgs::Odometry>("odom", 10, [this](const OdometryReader::Event& e) { onOdometry(e); });
     diagnostics_.add("camera", &camera_, &CameraInput::diagnose);
     diagnostics_.add("recording", this, &RouteRecorderNode::diagnose);
     start_service_ = serve("start", &RouteRecorderNode::start, this);
@@ -101,10 +101,10 @@ private:
 
   // ------------------------------------------------------------------------------------------------------- inputs
 
-  void onOdometry(const nav_msgs::Odometry& message)
+  void onOdometry(const OdometryReader::Event& event)
   {
     const std::lock_guard<std::mutex> lock(input_mutex_);
-    const std::optional<OdometryReading> reading = odometry_.read(message, odometry_subscriber_.getNumPublishers());
+    const std::optional<OdometryReading> reading = odometry_.read(event);
     if (!odometry_input_.jump().empty())
     {
       jump_ = odometry_input_.jump();
@@ -161,6 +161,23 @@ private:
 
   // ----------------------------------------------------------------------------------------------------- recording
 
+  /**
+   * @throws std::runtime_error when there is a view of a name that the route's views may get, as the recording would end
+   * at it.
+   */
+  void requireFreeNames(const std::string& name) const
+  {
+    for (const std::string& view : routes_.views().names())
+    {
+      if (view.compare(0, name.size() + 1, name + "_") == 0 &&
+          view.find_first_not_of("0123456789", name.size() + 1) == std::string::npos)
+      {
+        throw std::runtime_error("there is a view '" + view + "' already: take another name, or delete it if " +
+                                 "'routes list' shows no route that needs it");
+      }
+    }
+  }
+
   void start(const StartRoute::Request& request, StartRoute::Response& response)
   {
     const std::lock_guard<std::mutex> lock(recording_mutex_);
@@ -176,24 +193,27 @@ private:
     {
       refuse("a route's name is 1 to 58 letters, digits, '_' and '-', and starts with a letter or digit");
     }
-    if (routes_.has(name))
+    const bool replaces = routes_.has(name) && name == params_.overwrite;
+    if (routes_.has(name) && !replaces)
     {
       refuse("there is one of that name: delete or rename that first");
-    }
-    for (const auto& [view, revision] : routes_.views().revisions())
-    {
-      // Any of them, as the recording would end at it.
-      if (view.compare(0, name.size() + 1, name + "_") == 0 &&
-          view.find_first_not_of("0123456789", name.size() + 1) == std::string::npos)
-      {
-        refuse("there is a view '" + view + "' already: delete it, or take another name");
-      }
     }
     Recording recording;
     recording.route.name = name;
     try
     {
+      if (!replaces)
+      {
+        requireFreeNames(name);
+      }
       const Place place = waitForPlace();
+      if (replaces)
+      {
+        const std::string warning = routes_.remove(name);
+        ROS_INFO_STREAM("deleted route '" << name << "', which is replaced" << (warning.empty() ? "" : "; ")
+                                          << warning);
+        requireFreeNames(name);
+      }
       {
         const std::lock_guard<std::mutex> input_lock(input_mutex_);
         jump_.clear();

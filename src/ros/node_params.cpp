@@ -83,6 +83,9 @@ std::vector<Parameter> parameters(RouteRecorderParams& params)
                "how much later than images of the same moment odometry is stamped: it is taken away from odometry's "
                "stamps"),
           real("patience", params.patience, "s", "> 0", "longest wait of ~start and ~stop for an image and odometry"),
+          text("overwrite", params.overwrite,
+               "name of the route that ~start replaces: it is deleted, with its views, once there is an image to begin "
+               "with; empty: none"),
       },
       parameters(params.camera),
   });

@@ -238,7 +238,7 @@ public:
       return kinds.front();
     }
     say(kinds.empty()
-            ? "No driver runs" + place() + ": start homing.launch or arm_servo.launch, or name the robot's namespace"
+            ? "No driver runs" + place() + ": start a launch file that drives, or name the robot's namespace"
             : KINDS[kinds[0]].name + " and " + KINDS[kinds[1]].name + " both run" + place() +
                   ": start them in namespaces of their own",
         false);

@@ -364,6 +364,13 @@ void RouteStore::exportTo(const std::string& name, const fs::path& views_directo
     {
       fail("export", name, "there is one of that name in " + views_directory.string());
     }
+    for (const RouteStop& stop : route.stops)
+    {
+      if (fs::exists(yamlPath(views_directory, stop.view)))
+      {
+        fail("export", name, "there is a view '" + stop.view + "' in " + views_directory.string() + " already");
+      }
+    }
     std::vector<std::string> copied;
     try
     {

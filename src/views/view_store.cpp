@@ -481,6 +481,11 @@ std::map<std::string, std::string> ViewStore::revisions() const
   return revisions;
 }
 
+std::vector<std::string> ViewStore::names() const
+{
+  return findNames(directory_);
+}
+
 ViewStore::Listing ViewStore::list() const
 {
   Listing listing;

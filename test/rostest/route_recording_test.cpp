@@ -32,6 +32,35 @@ TEST_F(RoutesTest, RecordsViewsAlongTheWay)
   EXPECT_NE(start("hall").find("there is one of that name"), std::string::npos);
 }
 
+TEST_F(RoutesTest, ReplacesARouteWhenItIsAskedTo)
+{
+  const std::string recorder = "replacing_recorder";  // whose ~overwrite is "again"
+  ASSERT_TRUE(waitForService(recorder + "/stop"));
+  putAt(BEGIN);
+  for (const double length : { 1.2, 0.3 })
+  {
+    std::string answer;
+    EXPECT_TRUE(waitUntil([&] {
+      answer = start("again", recorder);
+      return answer.find("refused") == std::string::npos;
+    })) << answer;
+    drive(length, 0.0);
+    answer = stop(recorder);
+    ASSERT_EQ(answer.find("refused"), std::string::npos) << answer;
+    EXPECT_NEAR(lengthOf(store_->load("again")), length, 0.1);
+  }
+  EXPECT_EQ(store_->views().revisions().count("again_003"), 0U) << "the old one's views are deleted";
+  camera_ = false;
+  EXPECT_NE(start("again", recorder).find("refused"), std::string::npos);
+  camera_ = true;
+  EXPECT_EQ(store_->load("again").stops.size(), 2U) << "it is kept until there is something to replace it with";
+  store_->rename("again", "renamed");
+  EXPECT_NE(start("again", recorder).find("there is a view 'again_00"), std::string::npos) << "another route's";
+  EXPECT_NE(start("renamed", recorder).find("there is one of that name"), std::string::npos);
+  EXPECT_EQ(store_->load("renamed").stops.size(), 2U);
+  store_->remove("renamed");
+}
+
 TEST_F(RoutesTest, RefusesToRecordWhatCannotBe)
 {
   EXPECT_EQ(stop(), "refused: no route is recorded: call ~start first");

@@ -129,18 +129,18 @@ protected:
     ASSERT_TRUE(waitUntil([&] { return truth_.last()->header.stamp > now + ros::Duration(0.2); }));
   }
 
-  std::string start(const std::string& route)
+  std::string start(const std::string& route, const std::string& recorder = "route_recorder")
   {
     StartRoute service;
     service.request.name = route;
-    EXPECT_TRUE(callService("route_recorder/start", service));
+    EXPECT_TRUE(callService(recorder + "/start", service));
     return (service.response.success ? "" : "refused: ") + service.response.message;
   }
 
-  std::string stop()
+  std::string stop(const std::string& recorder = "route_recorder")
   {
     std_srvs::Trigger service;
-    EXPECT_TRUE(callService("route_recorder/stop", service));
+    EXPECT_TRUE(callService(recorder + "/stop", service));
     return (service.response.success ? "" : "refused: ") + service.response.message;
   }
 

@@ -318,8 +318,13 @@ TEST_F(RouteStoreTest, AnExportThatFailsLeavesNothing)
   StoredView view = store_.views().load("hall_001");
   view.name = "hall_003";
   other.views().save(view, false);
-  EXPECT_ERROR(store_.exportTo("hall", directory_.path() / "other"), "hall_003");
+  EXPECT_ERROR(store_.exportTo("hall", directory_.path() / "other"), "there is a view 'hall_003' in");
   EXPECT_EQ(other.views().list().names, Names{ "hall_003" });
+  EXPECT_TRUE(other.list().names.empty());
+  other.views().remove("hall_003");
+  std::ofstream(store_.views().directory() / "hall_003.yaml", std::ios::app) << "damaged\n";
+  EXPECT_ERROR(store_.exportTo("hall", directory_.path() / "other"), "hall_003");
+  EXPECT_TRUE(other.views().names().empty()) << "the views before it were copied";
   EXPECT_TRUE(other.list().names.empty());
 }
 

@@ -70,6 +70,7 @@ struct RouteRecorderParams
   std::string base_frame = "base_link";  ///< tf frame of the base, whose pose odometry is
   double odometry_delay = 0.0;           ///< odometry's stamps are later than images' of the same moment by this [s]
   double patience = 5.0;                 ///< longest wait of ~start and ~stop for an image and odometry [s]
+  std::string overwrite;                 ///< name of the route that ~start replaces; empty: none
   RouteSpacingParams spacing;
 
   /** Each fault in one line, those of nested parameters included; empty when the parameters are usable. */

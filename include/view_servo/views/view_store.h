@@ -109,6 +109,8 @@ public:
    * ViewStoreError when the directory cannot be read.
    */
   std::map<std::string, std::string> revisions() const;
+  /** Names that are in use, by damaged views, too; sorted. @throws ViewStoreError when the directory cannot be read. */
+  std::vector<std::string> names() const;
 
   struct Damaged
   {
