@@ -77,6 +77,11 @@ def legs_of(feedback):
     return [(i, views[i]) for i in range(len(views)) if i == 0 or views[i] != views[i - 1]]
 
 
+def last_leg_begin(run):
+    """When the drive to the last view began."""
+    return run["feedback"]["t"][legs_of(run["feedback"])[-1][0]]
+
+
 def ways_of(path):
     """The path's places, cut where the robot was put elsewhere."""
     points = np.column_stack([path["x"], path["y"]])

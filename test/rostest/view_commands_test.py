@@ -251,7 +251,7 @@ class ViewCommands(graph.GraphTest):
         self.view("go shelf servo:=arm1/servo --driver servo_25d")
         self.assertEqual(([goal.view for goal in self.arm.goals], self.arm.enabled), (["shelf"], None))
         self.homing.behaviour = "refuse"
-        self.view("go dock", NOT_DONE, "the gate of .* is closed.*; type: view go dock --enable")
+        self.view("go dock --driver homing", NOT_DONE, "the gate of .* is closed.*; type: view go dock --driver homing --enable")
         self.assertEqual(self.homing.enabled, True)
         self.view("go dock servo:=arm1/servo", CANNOT, "add --driver homing or --driver servo_25d")
         self.view("go dock --driver servo_25d", CANNOT, "servo_25d does not run here, but")
@@ -329,6 +329,7 @@ class ViewCommands(graph.GraphTest):
         self.assertEqual((self.follower.enabled, self.homing.goals, self.homing.enabled), (True, [], None))
         self.follower.behaviour = "refuse"
         self.view("follow hall", NOT_DONE, "the gate of .* is closed.*; type: view follow hall --enable")
+        self.view("follow hall --to hall_003", NOT_DONE, "; type: view follow hall --to hall_003 --enable")
         self.assertEqual((self.follower.goals[-1].start, self.follower.goals[-1].reverse), ("", False))
         self.follower.behaviour = "arrive"
         self.view("go hall_003 --driver route_follower")  # along its route
