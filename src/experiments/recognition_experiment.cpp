@@ -503,7 +503,7 @@ ViewSource heldViews(const std::map<std::string, cv::Mat>& images)
     view.image = images.at(name);
     return view;
   };
-  const auto structure = [](const std::string& /*name*/) {
+  const auto structure = [](const std::string& /*name*/, const std::string& /*revision*/) {
     return ViewStructure();
   };
   return { {}, revisions, load, structure };

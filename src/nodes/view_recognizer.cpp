@@ -48,6 +48,7 @@ using Clock = std::chrono::steady_clock;
 
 constexpr std::size_t READ_AT_ONCE = 5;           // views, after which others may use the index
 constexpr std::chrono::milliseconds PAUSE(1000);  // from one look at the store to the next
+constexpr std::chrono::milliseconds TURN(5);      // in which others may use the index while it is made
 
 std::vector<RecognizedView> toMessages(const std::vector<CandidateView>& views)
 {
@@ -69,13 +70,17 @@ std::vector<RecognizedView> toMessages(const std::vector<CandidateView>& views)
   return messages;
 }
 
-/** What was found, in one line. @param indexed number of views among which the image was looked for. */
-std::string describe(const std::vector<CandidateView>& views, std::size_t indexed, bool verified)
+/**
+ * What was found, in one line. @param indexed number of views among which the image was looked for.
+ * @param behind whether others are still to be indexed, or cannot be read.
+ */
+std::string describe(const std::vector<CandidateView>& views, std::size_t indexed, bool verified, bool behind)
 {
   const std::string among = " among " + std::to_string(indexed) + (indexed == 1 ? " view" : " views");
   if (views.empty())
   {
-    return indexed == 0 ? "there are no stored views" : "nothing in the image is like anything" + among;
+    return indexed == 0 ? (behind ? "no view is indexed yet" : "there are no stored views")
+                        : "nothing in the image is like anything" + among;
   }
   const CandidateView& best = views.front();
   if (best.verified)
@@ -133,12 +138,18 @@ public:
 
   ~ViewRecognizerNode()
   {
+    giveUp();
+    indexer_.join();
+  }
+
+  /** What is looked at now, and later, is not verified. */
+  void giveUp()
+  {
     {
       const std::lock_guard<std::mutex> lock(mutex_);
       stopping_ = true;
     }
     wake_.notify_all();
-    indexer_.join();
   }
 
 private:
@@ -146,13 +157,12 @@ private:
   std::vector<LiveGroup> liveNumbers()
   {
     ViewRecognizerNodeParams started = params_;
-    return { liveGroup<ViewRecognizerNodeParams>(
-        started, aroundNow(nodeParameters(started), { "rate" }, LIVE_RATE),
-        [this](const ViewRecognizerNodeParams& live) {
-          const std::lock_guard<std::mutex> lock(mutex_);
-          rate_ = live.rate;
-          next_frame_ = Clock::time_point();
-        }) };
+    return { liveGroup<ViewRecognizerNodeParams>(started, aroundNow(nodeParameters(started), { "rate" }, LIVE_RATE),
+                                                 [this](const ViewRecognizerNodeParams& live) {
+                                                   const std::lock_guard<std::mutex> lock(mutex_);
+                                                   rate_ = live.rate;
+                                                   next_frame_ = Clock::time_point();
+                                                 }) };
   }
 
   void recognize(const RecognizeView::Request& request, RecognizeView::Response& response)
@@ -162,7 +172,8 @@ private:
       throw std::invalid_argument("max_results: " + std::to_string(request.max_results) + " is negative");
     }
     const SourcedImage source = sources_.read(kindOf(request.image, "image"), request.image, "image");
-    const std::string behind = update(READ_AT_ONCE);
+    update(READ_AT_ONCE);
+    const std::string behind = whatIsMissing();
     const auto begin = Clock::now();
     const PreparedImage image(source.grey, source.region, recognizer_.features());
     const auto most = static_cast<std::size_t>(std::max(1, request.max_results));
@@ -170,7 +181,7 @@ private:
         recognizer_.recognize(image, most, request.verify, given_up_, source.camera);
     response.elapsed_ms = std::chrono::duration<double, std::milli>(Clock::now() - begin).count();
     response.success = !views.empty() && (views.front().verified || !request.verify);
-    response.message = describe(views, recognizer_.size(), request.verify) + behind;
+    response.message = describe(views, recognizer_.size(), request.verify, !behind.empty()) + behind;
     response.views = toMessages(views);
   }
 
@@ -187,35 +198,49 @@ private:
       {
         return;
       }
-      next_frame_ =
-          now + std::chrono::duration_cast<Clock::duration>(std::chrono::duration<double>(1.0 / rate_));
+      next_frame_ = now + std::chrono::duration_cast<Clock::duration>(std::chrono::duration<double>(1.0 / rate_));
     }
     worker_.put([&frame](std::optional<CameraFrame>& newest) { newest = frame; });
   }
 
   void recognizeFrame(const CameraFrame& frame)
   {
-    const PreparedImage image(toGrey(*frame.image), cv::Rect(), recognizer_.features());
-    const std::vector<CandidateView> views = recognizer_.recognize(image, 1, true, given_up_, toCamera(*frame.info));
+    RecognizedViews message;
+    message.header = frame.image->header;
+    std::string text;
+    const std::string fault = guarded("a camera image", [&] {
+      const PreparedImage image(toGrey(*frame.image), cv::Rect(), recognizer_.features());
+      const std::vector<CandidateView> views = recognizer_.recognize(image, 1, true, given_up_, toCamera(*frame.info));
+      const std::string behind = whatIsMissing();
+      message.views = toMessages(views);
+      text = describe(views, recognizer_.size(), true, !behind.empty()) + behind;
+      message.reason = !views.empty() && views.front().verified ? "" : text;
+    });
     if (given_up_())
     {
       return;
     }
-    RecognizedViews message;
-    message.header = frame.image->header;
-    message.views = toMessages(views);
-    const std::string text = describe(views, recognizer_.size(), true);
-    message.reason = !views.empty() && views.front().verified ? "" : text;
+    if (!fault.empty())
+    {
+      message.views.clear();
+      message.reason = text = fault;
+    }
     publisher_.publish(message);
     const std::lock_guard<std::mutex> lock(mutex_);
     last_ = text;
   }
 
-  /**
-   * Brings the index in step with the store, by so many views at most.
-   * @return what is still missing, to be appended to a message; empty when nothing is.
-   */
-  std::string update(std::size_t most)
+  /** What the index lacks, to be appended to a message; empty when it lacks nothing. */
+  std::string whatIsMissing()
+  {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    return (waiting_ == 0 ? "" : "; " + std::to_string(waiting_) + " views are still to be indexed") +
+           (unreadable_ == 0 ? "" : "; " + std::to_string(unreadable_) + " cannot be read, see the log") +
+           (fault_.empty() ? "" : "; " + fault_);
+  }
+
+  /** Brings the index in step with the store, by so many views at most. */
+  void update(std::size_t most)
   {
     const ViewRecognizer::Update update = recognizer_.update(most);
     for (const std::string& reason : update.unreadable)
@@ -225,8 +250,8 @@ private:
     const std::lock_guard<std::mutex> lock(mutex_);
     unsaved_ = unsaved_ || update.added > 0 || update.removed > 0;
     waiting_ = update.waiting;
+    unreadable_ = update.unusable;
     fault_.clear();
-    return waiting_ == 0 ? "" : "; " + std::to_string(waiting_) + " views are still to be indexed";
   }
 
   void keepInStep()
@@ -243,14 +268,16 @@ private:
       }
       if (fault.empty() && waiting_ > 0)
       {
+        wake_.wait_for(lock, TURN, [this] { return stopping_.load(); });  // so that requests get their turn
         continue;
       }
       if (unsaved_ && fault.empty())
       {
         unsaved_ = false;  // where it cannot be written, it is tried again after the next change
         lock.unlock();
-        guarded("saving the index", [this] { recognizer_.saveIndex(); });
+        const std::string unwritten = guarded("saving the index", [this] { recognizer_.saveIndex(); });
         lock.lock();
+        save_fault_ = unwritten;
       }
       wake_.wait_for(lock, PAUSE, [this] { return stopping_.load(); });
     }
@@ -260,10 +287,22 @@ private:
   {
     const std::size_t indexed = recognizer_.size();
     const std::lock_guard<std::mutex> lock(mutex_);
-    const unsigned char level =
-        fault_.empty() ? diagnostic_msgs::DiagnosticStatus::OK : diagnostic_msgs::DiagnosticStatus::ERROR;
-    status.summary(level, fault_.empty() ? std::to_string(indexed) + " views are indexed" : fault_);
+    status.summary(diagnostic_msgs::DiagnosticStatus::OK, std::to_string(indexed) + " views are indexed");
+    if (unreadable_ > 0)
+    {
+      status.mergeSummary(diagnostic_msgs::DiagnosticStatus::WARN,
+                          std::to_string(unreadable_) + " cannot be read, see the log");
+    }
+    if (!save_fault_.empty())
+    {
+      status.mergeSummary(diagnostic_msgs::DiagnosticStatus::WARN, save_fault_);
+    }
+    if (!fault_.empty())
+    {
+      status.summary(diagnostic_msgs::DiagnosticStatus::ERROR, fault_);
+    }
     status.add("Views to be indexed", waiting_);
+    status.add("Views that cannot be read", unreadable_);
     status.add("Last image", last_);
   }
 
@@ -275,6 +314,8 @@ private:
   Clock::time_point next_frame_;  // before it, camera images are left out
   bool unsaved_ = false;          // the index has changed since it was saved
   std::size_t waiting_ = 0;       // views that are not in the index yet
+  std::size_t unreadable_ = 0;    // views that cannot be read
+  std::string save_fault_;        // why the index is not saved
   std::string fault_;             // why the store cannot be read
   std::string last_ = "no image was looked at";
   std::atomic<bool> stopping_{ false };

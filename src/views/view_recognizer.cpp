@@ -2,17 +2,17 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "view_servo/views/view_recognizer.h"
 
+#include "stored_files.h"
 #include "view_servo/images/image_io.h"
 #include "view_servo/parameters/error_text.h"
 #include "view_servo/parameters/faults.h"
-
-#include <unistd.h>
 
 #include <algorithm>
 #include <cctype>
 #include <chrono>
 #include <cstdint>
 #include <fstream>
+#include <iterator>
 #include <optional>
 #include <set>
 #include <sstream>
@@ -98,8 +98,8 @@ ViewSource storedViews(const ViewStore& store)
   const auto load = [store](const std::string& name) {
     return store.load(name);
   };
-  const auto structure = [store](const std::string& name) {
-    return store.loadStructure(name);
+  const auto structure = [store](const std::string& name, const std::string& revision) {
+    return store.revision(name) == revision ? store.loadStructure(name) : ViewStructure();
   };
   return { store.directory(), revisions, load, structure };
 }
@@ -123,7 +123,7 @@ ViewSource imageFiles(const fs::path& directory)
     view.image = readGreyImage((directory / name).string());
     return view;
   };
-  const auto structure = [](const std::string& /*name*/) {
+  const auto structure = [](const std::string& /*name*/, const std::string& /*revision*/) {
     return ViewStructure();
   };
   return { directory, revisions, load, structure };
@@ -143,10 +143,14 @@ std::size_t ViewRecognizer::size() const
   return index_.size();
 }
 
-ViewRecognizer::Update ViewRecognizer::update(std::size_t most)
+ViewRecognizer::Update ViewRecognizer::update(std::size_t most, std::chrono::steady_clock::time_point now)
 {
   const std::lock_guard<std::mutex> updating(update_mutex_);
   const std::map<std::string, std::string> wanted = source_.revisions();
+  if (wanted.empty() && size() > 0 && !fs::exists(source_.directory))
+  {
+    throw std::runtime_error("the directory " + source_.directory.string() + " is not there any more");
+  }
   Update update;
   std::vector<std::pair<std::string, std::string>> to_read;
   {
@@ -164,17 +168,23 @@ ViewRecognizer::Update ViewRecognizer::update(std::size_t most)
         ++known;
       }
     }
+    for (auto known = unreadable_.begin(); known != unreadable_.end();)
+    {
+      known = wanted.count(known->first) == 0 ? unreadable_.erase(known) : std::next(known);
+    }
     for (const auto& [name, revision] : wanted)
     {
-      const auto is = [&, &name = name, &revision = revision](const std::map<std::string, std::string>& map) {
-        const auto found = map.find(name);
-        return found != map.end() && found->second == revision;
-      };
-      if (!is(revisions_) && !is(unreadable_))
+      const auto known = revisions_.find(name);
+      const auto unreadable = unreadable_.find(name);
+      const bool is_known = known != revisions_.end() && known->second == revision && doubtful_.count(name) == 0;
+      const bool is_given_up =
+          unreadable != unreadable_.end() && unreadable->second.revision == revision && now < unreadable->second.next;
+      if (!is_known && !is_given_up)
       {
         to_read.emplace_back(name, revision);
       }
     }
+    doubtful_.clear();
   }
   update.waiting = to_read.size() - std::min(most, to_read.size());
   to_read.resize(to_read.size() - update.waiting);
@@ -187,17 +197,27 @@ ViewRecognizer::Update ViewRecognizer::update(std::size_t most)
       const std::lock_guard<std::mutex> lock(mutex_);
       index_.add(name, features);
       revisions_[name] = revision;
+      unreadable_.erase(name);
       update.added += 1;
     }
     catch (const std::exception& error)
     {
-      update.unreadable.push_back(oneLine(error));
+      // Perhaps its picture is still on its way: the text file, which comes with it, will not change any more.
+      constexpr std::chrono::seconds UNTIL_NEXT(30);
       const std::lock_guard<std::mutex> lock(mutex_);
+      update.removed += revisions_.erase(name);
       index_.remove(name);
-      revisions_.erase(name);
-      unreadable_[name] = revision;
+      Unreadable& unreadable = unreadable_[name];
+      const std::string reason = oneLine(error);
+      if (unreadable.reason != reason)
+      {
+        update.unreadable.push_back(reason);
+      }
+      unreadable = { revision, reason, now + UNTIL_NEXT };
     }
   }
+  const std::lock_guard<std::mutex> lock(mutex_);
+  update.unusable = unreadable_.size();
   return update;
 }
 
@@ -236,7 +256,9 @@ std::shared_ptr<const ViewRecognizer::Prepared> ViewRecognizer::prepared(const s
   }
   catch (const std::exception&)
   {
-    return nullptr;  // update() will say why
+    const std::lock_guard<std::mutex> lock(mutex_);
+    doubtful_.insert(name);  // update() will say why
+    return nullptr;
   }
   const std::lock_guard<std::mutex> lock(mutex_);
   prepared_.push_front(entry);
@@ -247,12 +269,12 @@ std::shared_ptr<const ViewRecognizer::Prepared> ViewRecognizer::prepared(const s
   return entry;
 }
 
-std::optional<StructurePose> ViewRecognizer::poseIn(const StoredView& view, const ViewMatch& match,
+std::optional<StructurePose> ViewRecognizer::poseIn(const Prepared& reference, const ViewMatch& match,
                                                     const Camera& camera) const
 {
   try
   {
-    return structurePose(match, view, source_.structure(view.name), camera);
+    return structurePose(match, reference.view, source_.structure(reference.view.name, reference.revision), camera);
   }
   catch (const std::exception&)
   {
@@ -289,7 +311,7 @@ std::vector<CandidateView> ViewRecognizer::recognize(const PreparedImage& image,
         view.verified = true;
         view.inliers = match.inliers;
         view.log_significance = match.log_significance;
-        view.pose = is_calibrated ? poseIn(reference->view, match, *camera) : std::nullopt;
+        view.pose = is_calibrated ? poseIn(*reference, match, *camera) : std::nullopt;
         verified += 1;
       }
     }
@@ -322,10 +344,9 @@ std::string ViewRecognizer::header() const
 void ViewRecognizer::saveIndex() const
 {
   const fs::path file = indexFile();
-  const fs::path temporary = file.string() + "." + std::to_string(::getpid()) + ".tmp";
   try
   {
-    std::ofstream stream(temporary, std::ios::binary);
+    std::ostringstream stream;
     {
       const std::lock_guard<std::mutex> lock(mutex_);
       stream << header() << '\n' << revisions_.size() << '\n';
@@ -335,17 +356,11 @@ void ViewRecognizer::saveIndex() const
       }
       index_.save(stream);
     }
-    stream.close();
-    if (!stream)
-    {
-      throw std::runtime_error("it cannot be written");
-    }
-    fs::rename(temporary, file);
+    const DirectoryLock lock(source_.directory);
+    replaceFile(file, stream.str());
   }
   catch (const std::exception& error)
   {
-    std::error_code ignored;  // the first error is the one to tell
-    fs::remove(temporary, ignored);
     throw std::runtime_error("the index " + file.string() + " is not saved: " + oneLine(error));
   }
 }

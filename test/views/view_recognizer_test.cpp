@@ -11,6 +11,7 @@
 #include <opencv2/core.hpp>
 #include <opencv2/imgcodecs.hpp>
 
+#include <chrono>
 #include <cstdint>
 #include <filesystem>
 #include <optional>
@@ -143,6 +144,11 @@ TEST_F(ViewRecognizerTest, TellsWhereTheCameraIsOnceTheViewHasStructure)
   ASSERT_TRUE(view.pose);
   EXPECT_LT((view.pose->view_from_current.translation() - roomViewFromCurrent().translation()).norm(), 0.02);
   EXPECT_FALSE(best(Camera()).pose) << "the camera is not calibrated";
+  StoredView anew = roomView(room);
+  anew.stamp += 1.0;
+  store_.save(anew, true);
+  ASSERT_TRUE(store_.saveStructure("room", store_.revision("room"), roomStructure(4)));
+  EXPECT_FALSE(best(roomCamera()).pose) << "these are depths of another picture than the one that is indexed";
 }
 
 TEST_F(ViewRecognizerTest, GivesUpWhenAsked)
@@ -201,6 +207,54 @@ TEST_F(ViewRecognizerTest, NamesADamagedViewOnceAndUsesTheOthers)
   save("view5", 55);
   EXPECT_EQ(recognizer.update(ALL).added, 1U);
   EXPECT_EQ(best(recognizer, 55), "view5");
+}
+
+TEST_F(ViewRecognizerTest, TriesAViewAgainWhosePictureComesLater)
+{
+  const auto pictures = [this] {
+    std::vector<std::filesystem::path> files;
+    for (const auto& entry : std::filesystem::directory_iterator(store_.directory()))
+    {
+      if (entry.path().filename().string().rfind("view5.", 0) == 0 && entry.path().extension() == ".png")
+      {
+        files.push_back(entry.path());
+      }
+    }
+    return files;
+  };
+  ASSERT_EQ(pictures().size(), 1U);
+  const std::filesystem::path picture = pictures().front();
+  const std::filesystem::path aside = directory_.path() / "aside.png";
+  std::filesystem::rename(picture, aside);
+  ViewRecognizer recognizer(storedViews(store_), params());
+  const auto now = std::chrono::steady_clock::now();
+  EXPECT_EQ(recognizer.update(ALL, now).unreadable.size(), 1U);
+  std::filesystem::rename(aside, picture);
+  EXPECT_EQ(recognizer.update(ALL, now + std::chrono::seconds(1)).added, 0U) << "not at each look";
+  EXPECT_EQ(recognizer.update(ALL, now + std::chrono::seconds(1)).unusable, 1U);
+  const ViewRecognizer::Update later = recognizer.update(ALL, now + std::chrono::seconds(31));
+  EXPECT_EQ(later.added, 1U);
+  EXPECT_EQ(later.unusable, 0U);
+
+  // Lost once more after it was indexed: the next image that seems to show it finds that out.
+  std::filesystem::rename(picture, aside);
+  EXPECT_FALSE(recognizer.recognize(seen(recognizer, 5), 1, true).front().verified);
+  const ViewRecognizer::Update lost = recognizer.update(ALL, now + std::chrono::seconds(32));
+  ASSERT_EQ(lost.unreadable.size(), 1U);
+  EXPECT_NE(lost.unreadable.front().find("view5"), std::string::npos);
+  EXPECT_TRUE(recognizer.update(ALL, now + std::chrono::seconds(63)).unreadable.empty()) << "it was told";
+}
+
+TEST_F(ViewRecognizerTest, KeepsItsIndexWhileTheDirectoryIsGone)
+{
+  ViewRecognizer recognizer(storedViews(store_), params());
+  recognizer.update(ALL);
+  const std::filesystem::path aside = directory_.path() / "aside";
+  std::filesystem::rename(store_.directory(), aside);
+  EXPECT_THROW(recognizer.update(ALL), std::runtime_error);
+  EXPECT_EQ(recognizer.size(), VIEWS);
+  std::filesystem::rename(aside, store_.directory());
+  EXPECT_EQ(recognizer.update(ALL).added, 0U);
 }
 
 TEST_F(ViewRecognizerTest, ASavedIndexIsTakenOverAndBroughtInStep)

@@ -12,6 +12,7 @@
 #include "view_servo/views/view_store.h"
 #include "view_servo/views/view_structure.h"
 
+#include <chrono>
 #include <cstddef>
 #include <filesystem>
 #include <functional>
@@ -20,6 +21,7 @@
 #include <memory>
 #include <mutex>
 #include <optional>
+#include <set>
 #include <string>
 #include <vector>
 
@@ -51,8 +53,11 @@ struct ViewSource
   std::function<std::map<std::string, std::string>()> revisions;
   /** @throws std::runtime_error when the view cannot be read. */
   std::function<StoredView(const std::string& name)> load;
-  /** What has been learnt of a view. @throws std::runtime_error when it cannot be read. */
-  std::function<ViewStructure(const std::string& name)> structure;
+  /**
+   * What has been learnt of a view; nothing when its text is not `revision` any more. @throws std::runtime_error when it
+   * cannot be read.
+   */
+  std::function<ViewStructure(const std::string& name, const std::string& revision)> structure;
 };
 
 /** The views of a store. */
@@ -95,18 +100,22 @@ public:
 
   struct Update
   {
-    std::size_t added = 0;    ///< views that are new or were changed
-    std::size_t removed = 0;  ///< views that are gone
-    std::size_t waiting = 0;  ///< views that still have to be added
-    /** Why views that are new or were changed cannot be read, one line each. They are tried again once they change. */
+    std::size_t added = 0;     ///< views that are new or were changed
+    std::size_t removed = 0;   ///< views that are gone
+    std::size_t waiting = 0;   ///< views that still have to be added
+    std::size_t unusable = 0;  ///< views that cannot be read
+    /**
+     * Why, one line each of those that are new here or have another reason than before. They are tried again once they
+     * change, and now and then.
+     */
     std::vector<std::string> unreadable;
   };
   /**
    * Adds the source's new and changed views to the index and removes those that are gone. Takes little time when
-   * nothing has changed. @param most views that are read at most. @throws std::runtime_error when the source cannot be
-   * listed.
+   * nothing has changed. @param most views that are read at most. @param now views that could not be read half a minute
+   * before are tried again. @throws std::runtime_error when the source cannot be listed.
    */
-  Update update(std::size_t most);
+  Update update(std::size_t most, std::chrono::steady_clock::time_point now = std::chrono::steady_clock::now());
 
   /** Number of views in the index. */
   std::size_t size() const;
@@ -124,7 +133,7 @@ public:
   /** Where saveIndex() and loadIndex() keep the index: beside the views. */
   std::filesystem::path indexFile() const;
 
-  /** Replaces the file in one step. @throws std::runtime_error naming the file when it cannot be written. */
+  /** Replaces the file in one step, one process at a time. @throws std::runtime_error naming the file when it cannot be written. */
   void saveIndex() const;
 
   /**
@@ -145,10 +154,18 @@ private:
     StoredView view;  ///< without its image
   };
 
+  /** A view that could not be read. */
+  struct Unreadable
+  {
+    std::string revision;
+    std::string reason;
+    std::chrono::steady_clock::time_point next;  ///< when it is tried again
+  };
+
   std::string header() const;
   /** Null: it was removed meanwhile, or cannot be read. */
   std::shared_ptr<const Prepared> prepared(const std::string& name) const;
-  std::optional<StructurePose> poseIn(const StoredView& view, const ViewMatch& match, const Camera& camera) const;
+  std::optional<StructurePose> poseIn(const Prepared& reference, const ViewMatch& match, const Camera& camera) const;
 
   ViewRecognizerParams params_;
   ViewSource source_;
@@ -158,7 +175,8 @@ private:
   mutable std::mutex mutex_;  // guards what follows
   ViewIndex index_;
   std::map<std::string, std::string> revisions_;                 // of the views in the index
-  std::map<std::string, std::string> unreadable_;                // revisions of views that could not be read
+  std::map<std::string, Unreadable> unreadable_;                 // views that are not
+  mutable std::set<std::string> doubtful_;                       // views in it that could not be read since
   mutable std::list<std::shared_ptr<const Prepared>> prepared_;  // views verified last, used last first
 };
 
