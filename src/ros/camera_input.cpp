@@ -135,7 +135,8 @@ CameraFrame CameraInput::latest() const
       faultOfAge(latest_.image->header.stamp, image_subscriber_.getTopic(), params_.max_image_age);
   if (!fault.empty())
   {
-    throw ImageError(fault);
+    // What has come since then could not be used.
+    throw ImageError(problem_.empty() ? fault : "no usable image from the camera: " + problem_);
   }
   return latest_;
 }
@@ -245,7 +246,8 @@ void CameraInput::checkInputs()
     // Images alone are told of by onImage(), as a calibration may come after its image.
     const CameraTraffic traffic{ images_, infos_, pairs_, CHECK_PERIOD, pairing_.imagesAhead() };
     problem = infos_ > 0 ? faultOf(traffic, topics()) : "";
-    problem_ = problem.empty() ? problem_ : problem;
+    const bool silent = images_ + infos_ + pairs_ == 0;
+    problem_ = !problem.empty() ? problem : silent && latest_.image ? "" : problem_;
     images_ = infos_ = pairs_ = 0;
   }
   reportProblem(problem);

@@ -28,7 +28,8 @@ HostedNode::~HostedNode()
     guarded("the end", [this] { node_->stop(); });
     waitForLastCommand();
   }
-  // As in a process of its own, the node ends after its last callback.
+  // As in a process of its own, the node ends after its last callback; the nodelet manager waits for that.
+  node_->giveUp();
   spinner_.stop();
   node_.reset();
 }

@@ -69,6 +69,7 @@ public:
                 << summary(findings_) << (picture_.empty() ? "" : "; the camera's picture is in " + picture_)
                 << std::endl;
     }
+    requireWritten(std::cout);
     return exitStatus(findings_);
   }
 

@@ -62,6 +62,14 @@ std::string withDefault(const std::string& description, const std::optional<Numb
 
 }  // namespace
 
+void requireWritten(std::ostream& standard_output)
+{
+  if (!standard_output.flush())
+  {
+    throw std::runtime_error("what is printed cannot be written to standard output: is the disk full?");
+  }
+}
+
 CommandLine::CommandLine(std::string introduction, std::string ending)
   : introduction_(std::move(introduction)), ending_(std::move(ending))
 {

@@ -44,6 +44,9 @@ private:
   int standard_error_;
 };
 
+/** @throws std::runtime_error when what was printed there is not written, as on a full disk. */
+void requireWritten(std::ostream& standard_output);
+
 /** Words of a command line that a program does not understand: what() names the option, and what it takes. */
 class CommandLineError : public std::runtime_error
 {

@@ -271,7 +271,9 @@ int main(int argc, char** argv)
   cv::utils::logging::setLogLevel(cv::utils::logging::LOG_LEVEL_SILENT);
   try
   {
-    return run(argc, argv);
+    const int status = run(argc, argv);
+    requireWritten(std::cout);
+    return status;
   }
   catch (const std::exception& error)
   {

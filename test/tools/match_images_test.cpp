@@ -73,6 +73,16 @@ TEST_F(MatchImagesTest, JsonHasEveryField)
   EXPECT_GT(close_inliers, 0.95 * inliers);
 }
 
+TEST_F(MatchImagesTest, AFullDiskIsNoSuccess)
+{
+  for (const char* more : { "", " --json" })
+  {
+    const std::string command =
+        std::string(MATCH_IMAGES_PATH) + " points " + reference_ + " " + current_ + more + " > /dev/full";
+    expectBadInput(runProgram("/bin/sh", { "-c", command }), "standard output");
+  }
+}
+
 TEST_F(MatchImagesTest, GivesTheSameBytesAgain)
 {
   json first = matchJson(reference_, current_, 0);

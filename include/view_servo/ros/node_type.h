@@ -22,6 +22,10 @@ public:
   RunningNode(const RunningNode&) = delete;
   RunningNode& operator=(const RunningNode&) = delete;
 
+  /** Of a node that may work on a request for long: ends that early. To be called before its callbacks are waited for. */
+  virtual void giveUp()
+  {
+  }
   /** Of a node that drives a robot: sends zero; after that, it does not drive any more. */
   virtual void stop()
   {

@@ -23,8 +23,24 @@ public:
   {
   }
 
+  void giveUp() override
+  {
+    giveUp(node_, 0);
+  }
+
 protected:
   Node node_;
+
+private:
+  template <typename Any>
+  static auto giveUp(Any& node, int /*preferred*/) -> decltype(node.giveUp())
+  {
+    node.giveUp();
+  }
+  template <typename Any>
+  static void giveUp(Any& /*node*/, long /*otherwise*/)
+  {
+  }
 };
 
 template <typename Node>

@@ -106,8 +106,8 @@ struct MatchLabel
  *
  * The view is chosen by `~view`, by people with `~set_view`, and by a driver with a message on `wanted_view`
  * (view_servo/WantedView); see ViewChoice. Every message says which view and which driver's goal it is about, and why
- * nothing was found. What cannot be matched at all, because there is no such view, it is damaged or has another size
- * than the camera's images, is refused by a message at once, and again at `~rate` while images come.
+ * nothing was found. What cannot be matched at all, because there is no such view or it is damaged, is refused by a
+ * message at once, and again at `~rate` while images come.
  *
  * Camera images are matched by a thread of the node's own, which always takes the newest: matching takes longer than
  * the time between two images, and in a subscriber's callback they would queue up and grow old. As matching is costly,
@@ -148,12 +148,18 @@ public:
 
   ~StreamingMatcher()
   {
+    giveUp();
+    worker_.join();
+  }
+
+  /** What is matched now, and later, has found nothing. */
+  void giveUp()
+  {
     {
       const std::lock_guard<std::mutex> lock(mutex_);
       stopping_ = true;
     }
     wake_.notify_all();
-    worker_.join();
   }
 
 private:
