@@ -237,10 +237,9 @@ public:
     {
       return kinds.front();
     }
-    say(kinds.empty()
-            ? "No driver runs" + place() + ": start a launch file that drives, or name the robot's namespace"
-            : KINDS[kinds[0]].name + " and " + KINDS[kinds[1]].name + " both run" + place() +
-                  ": start them in namespaces of their own",
+    say(kinds.empty() ? "No driver runs" + place() + ": start a launch file that drives, or name the robot's namespace"
+                      : KINDS[kinds[0]].name + " and " + KINDS[kinds[1]].name + " both run" + place() +
+                            ": start them in namespaces of their own",
         false);
     return std::nullopt;
   }
