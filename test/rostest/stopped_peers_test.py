@@ -46,8 +46,10 @@ class StoppedPeers(graph.GraphTest):
     def moves(self):
         return bool(self.commands) and not is_zero(self.commands[-1][1])
 
-    def stop(self, nodes):
+    def stop(self, nodes, master=False):
         self.stopped = [self.pid_of(node) for node in nodes]
+        if master:
+            self.stopped.append(self.graph.master.getPid(graph.CALLER)[2])
         for pid in self.stopped:
             os.kill(pid, signal.SIGSTOP)
         return time.monotonic()
@@ -103,6 +105,20 @@ class StoppedPeers(graph.GraphTest):
         process, result = self.begin("homing.launch")
         since = self.stop(["/point_matcher", "/line_matcher"])
         graph.wait_until("the end of the pause", lambda: time.monotonic() > since + STOPPED)
+        self.go_on()
+        self.assert_arrives(process, result)
+
+    def test_route_while_the_master_hangs(self):
+        """The follower has asked the master where a recognizer is when its view is not found; nothing may wait for that."""
+        self.listen(Twist, lambda command: command)
+        process, result = self.begin("route.launch")
+        drives = "view 'demo_003', "
+        graph.wait_until("the third view", lambda: any(drives in status.reason for status in self.statuses), PATIENCE)
+        since = self.stop(["/point_matcher", "/line_matcher"], master=True)
+        asked = since + 2.0  # when the view has not been found for so long
+        graph.wait_until("a stand", lambda: time.monotonic() > asked + 1.0 and not self.moves(), 15.0 * graph.SLOWDOWN)
+        graph.wait_until("further commands", lambda: self.commands[-1][0] > asked + 1.5)
+        self.assertNotEqual(self.statuses[-1].reason, "")
         self.go_on()
         self.assert_arrives(process, result)
 
