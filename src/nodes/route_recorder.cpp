@@ -41,8 +41,8 @@ namespace view_servo
  * RouteSpacing), and at the end. Private parameters: see RouteRecorderParams.
  *
  * Subscribes `image_raw`, `camera_info` (see CameraInput), `odom` (nav_msgs/Odometry), of `~base_frame`, and tf.
- * Services: `~start` (view_servo/StartRoute); `~stop` (std_srvs/Trigger): stores the route. When that cannot be, the
- * answer says why, and the views that belong to it are removed. Publishes `/diagnostics`.
+ * Services: `~start` (view_servo/StartRoute); `~stop` (std_srvs/Trigger): stores the route, as far as it has come.
+ * When that cannot be, the answer says why, and the views that belong to it are removed. Publishes `/diagnostics`.
  */
 class RouteRecorderNode : private NodeBase
 {
@@ -242,16 +242,28 @@ private:
     }
     Route& route = recording_->route;
     const std::string name = route.name;
+    std::string lack;  // why the end is missing, or all after a fault; what was recorded before is not thrown away
     try
     {
-      checkGoesOn();
-      const Place place = waitForPlace();
-      const PlanarPose moved = compose(inverse(route.stops.back().base), place.base);
-      if (moved.distance() > SAME_PLACE || std::abs(moved.yaw) > SAME_PLACE)
+      try
       {
-        addChecked(place);
+        checkGoesOn();
+        const Place place = waitForPlace();
+        const PlanarPose moved = compose(inverse(route.stops.back().base), place.base);
+        if (moved.distance() > SAME_PLACE || std::abs(moved.yaw) > SAME_PLACE)
+        {
+          addChecked(place);
+        }
+        checkGoesOn();
       }
-      checkGoesOn();
+      catch (const std::exception& error)
+      {
+        if (route.stops.size() < 2)
+        {
+          throw;
+        }
+        lack = "; it ends there, as " + oneLine(error);
+      }
       learnLast();
       if (route.stops.size() < 2)
       {
@@ -266,10 +278,17 @@ private:
     }
     char text[160];
     std::snprintf(text, sizeof(text), "', %zu views over %.2f m", route.stops.size(), lengthOf(route));
-    response.message = "stored route '" + name + text;
+    response.message = "stored route '" + name + text + lack;
     response.success = 1;
     recording_.reset();
-    ROS_INFO_STREAM(response.message);
+    if (lack.empty())
+    {
+      ROS_INFO_STREAM(response.message);
+    }
+    else
+    {
+      ROS_WARN_STREAM(response.message);
+    }
   }
 
   /** @throws std::runtime_error saying why the route cannot be stored any more. */
