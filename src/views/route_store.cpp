@@ -237,8 +237,9 @@ std::string RouteStore::routeWith(const std::string& view) const
     {
       if (!found.empty())
       {
-        throw RouteStoreError("view '" + view + "' is on route '" + found + "' and on route '" + name +
-                              "': name the one to follow");
+        std::string reason = "view '" + view;
+        reason.append("' is on route '").append(found).append("' and on route '").append(name);
+        throw RouteStoreError(reason + "': name the one to follow");
       }
       found = name;
     }

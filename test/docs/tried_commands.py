@@ -265,14 +265,20 @@ class TriedCommands(unittest.TestCase):
         """Against the running nodes; a form, such as one with NAME, has commands and options that --help knows."""
         command = "rosrun view_servo view "
         commands = arguments[0].split("|")
-        if len(commands) > 1 or "NAME" in arguments or "--help" in arguments or arguments in (["save"], ["show"], ["go"]):
+        if commands == ["record"] and arguments != ["record", "ROUTE"]:
+            self.try_record(command + " ".join(map(shlex.quote, arguments)))
+            return
+        # No matcher follows the follower here: test/rostest/routes_test.cpp drives along routes.
+        if len(commands) > 1 or {"NAME", "ROUTE", "--help"} & set(arguments) or arguments in (["save"], ["show"], ["go"]) or \
+                commands == ["follow"]:
             known = self.run_here(command + "--help")
             for name in commands:
                 self.assertIn(("    %s " if name.isalpha() else "%s") % name, known)
             if len(arguments) > 1:
                 known = self.run_here(command + commands[0] + " --help")
                 for option in arguments[1:]:
-                    self.assertIn(option, known)
+                    if option.startswith("-") or option.isupper():
+                        self.assertIn(option, known)
             return
         arms = self.ARM_VIEWS & set(arguments)
         if commands[0] == "watch":  # until somebody interrupts it
@@ -281,6 +287,19 @@ class TriedCommands(unittest.TestCase):
         self.assertEqual(status, 0, text)
         said = {"go": "arrived", "watch": "/homing: ", "stop": "disabled; no goal is left", "list": "dock"}
         self.assertIn(said.get(commands[0], ""), text)
+
+    def try_record(self, command):
+        """Until somebody interrupts it, who has driven the base backwards meanwhile, and puts it back where it was."""
+        base = self.graphs[0]
+        driving = base.start("rostopic", "pub", "-r", "10", "/cmd_vel", "geometry_msgs/Twist", "{linear: {x: -0.2}}")
+        try:
+            status, text = base.run("timeout --preserve-status --signal=INT 8 " + command, PATIENCE)
+        finally:
+            driving.terminate()
+            driving.wait(PATIENCE)
+            base.run("rosservice call /nomad_sim/set_pose '{pose: {orientation: {w: 1.0}}}'", PATIENCE)
+        self.assertEqual(status, 0, text)
+        self.assertIn("stored route '", text)
 
     def record_run(self, bag):
         """Records what homing tells during a goal, until that has ended."""
