@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstddef>
 #include <stdexcept>
 #include <utility>
 
@@ -64,9 +65,13 @@ bool comesByAgain(const std::vector<RouteStop>& stops, std::size_t at, std::size
 {
   constexpr double NEAR = 0.5;   // [m]
   constexpr double ALIKE = 0.5;  // [rad]
-  constexpr std::size_t ELSEWHERE = 3;
-  const PlanarPose way = relative(stops[at], stops[other]);
-  return std::max(at, other) - std::min(at, other) >= ELSEWHERE && way.distance() < NEAR && std::abs(way.yaw) < ALIKE;
+  const auto is_there = [&](const RouteStop& stop) {
+    const PlanarPose way = relative(stops[at], stop);
+    return way.distance() < NEAR && std::abs(way.yaw) < ALIKE;
+  };
+  const auto between = stops.begin() + static_cast<std::ptrdiff_t>(std::min(at, other));
+  const auto end = stops.begin() + static_cast<std::ptrdiff_t>(std::max(at, other));
+  return is_there(stops[other]) && !std::all_of(between, end, is_there);
 }
 
 RouteGuide::RouteGuide(const RouteGuideParams& params, std::vector<RouteStop> stops, double blind_speed)

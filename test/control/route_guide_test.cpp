@@ -230,8 +230,15 @@ TEST(RouteGuide, DoesNotTakeTheEndOfALoopForItsBeginning)
   }
   RouteGuide guide(RouteGuideParams(), loop, 0.1);
   EXPECT_TRUE(comesByAgain(loop, 0, 8));
+  EXPECT_TRUE(comesByAgain(loop, 8, 0));
   EXPECT_FALSE(comesByAgain(loop, 0, 4)) << "it looks the other way there";
   EXPECT_FALSE(comesByAgain(loop, 0, 1));
+  std::vector<RouteStop> dense;
+  for (int i = 0; i < 6; ++i)
+  {
+    dense.push_back({ std::string(1, static_cast<char>('a' + i)), { 0.08 * i, 0.0, 0.0 }, 0.0 });
+  }
+  EXPECT_FALSE(comesByAgain(dense, 0, 5)) << "near, but the way has not been elsewhere";
   EXPECT_FALSE(guide.mayJumpTo("i")) << "the loop has not been driven";
   EXPECT_TRUE(guide.mayJumpTo("h"));
   guide.jumpTo("h");

@@ -133,7 +133,10 @@ public:
   /** Where saveIndex() and loadIndex() keep the index: beside the views. */
   std::filesystem::path indexFile() const;
 
-  /** Replaces the file in one step, one process at a time. @throws std::runtime_error naming the file when it cannot be written. */
+  /**
+   * Replaces the file in one step, one process at a time. @throws std::runtime_error naming the file when it cannot be
+   * written.
+   */
   void saveIndex() const;
 
   /**
