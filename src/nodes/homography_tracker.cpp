@@ -18,6 +18,7 @@
 #include "view_servo/ros/plane_searcher.h"
 #include "view_servo/ros/plane_session.h"
 #include "view_servo/ros/session_starter.h"
+#include "view_servo/ros/steady_wait.h"
 #include "view_servo/ros/timings.h"
 #include "view_servo/ros/transform_source.h"
 #include "view_servo/ros/view_choice.h"
@@ -268,7 +269,7 @@ private:
       }
       else
       {
-        wake_.wait_for(lock, REPORT_PERIOD, due);
+        waitSteadily(wake_, lock, REPORT_PERIOD, due);
       }
       if (task.number != task_number_)
       {

@@ -94,8 +94,8 @@ void run()
   };
   publish();
   // A driver that starts later may give the frame another parent: then what is above that has to be placed.
-  const ros::WallTimer watch =
-      ros::NodeHandle().createWallTimer(ros::WallDuration(LOOK_PERIOD), [&](const ros::WallTimerEvent& /*event*/) {
+  const ros::SteadyTimer watch =
+      ros::NodeHandle().createSteadyTimer(ros::WallDuration(LOOK_PERIOD), [&](const ros::SteadyTimerEvent& /*event*/) {
         std::string parent;
         if (buffer._getParent(transform.child_frame_id, ros::Time(0), parent) && parent != transform.header.frame_id)
         {

@@ -14,6 +14,7 @@
 #include "view_servo/views/route_store.h"
 
 #include <algorithm>
+#include <chrono>
 #include <cmath>
 #include <cstddef>
 #include <memory>
@@ -181,6 +182,8 @@ public:
   }
 
 private:
+  using Clock = std::chrono::steady_clock;
+
   static constexpr std::size_t MOST_STOPS = 100;  // that markers show to either side of the base
 
   /** What the loader has to read. */
@@ -380,7 +383,7 @@ private:
     }
     else if (!lost_since_)
     {
-      lost_since_ = ros::WallTime::now();
+      lost_since_ = Clock::now();
     }
   }
 
@@ -402,9 +405,8 @@ private:
    */
   void listenToRecognizer()
   {
-    const ros::WallDuration patience(2.0);
-    const bool lost =
-        context_.locked([&] { return guide_ && lost_since_ && ros::WallTime::now() - *lost_since_ > patience; });
+    constexpr std::chrono::seconds PATIENCE(2);
+    const bool lost = context_.locked([&] { return guide_ && lost_since_ && Clock::now() - *lost_since_ > PATIENCE; });
     if (!lost)
     {
       recognized_.shutdown();
@@ -442,7 +444,7 @@ private:
   std::vector<RouteStop> stops_;             // of the goal
   std::string ordered_;                      // the view that is read, or was last
   bool jumps_ = false;                       // the base drives to that one at once
-  std::optional<ros::WallTime> lost_since_;  // the view is not found
+  std::optional<Clock::time_point> lost_since_;  // the view is not found
   ros::Subscriber recognized_;               // homing's thread's alone
   // Their threads use what is above, and homing's the worker, only while a goal runs; the worker may still use homing.
   ViewHoming homing_;

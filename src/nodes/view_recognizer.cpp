@@ -12,6 +12,7 @@
 #include "view_servo/ros/node_params.h"
 #include "view_servo/ros/node_type_of.h"
 #include "view_servo/ros/parameters.h"
+#include "view_servo/ros/steady_wait.h"
 #include "view_servo/ros/worker.h"
 #include "view_servo/views/prepared_image.h"
 #include "view_servo/views/view_recognizer.h"
@@ -268,7 +269,7 @@ private:
       }
       if (fault.empty() && waiting_ > 0)
       {
-        wake_.wait_for(lock, TURN, [this] { return stopping_.load(); });  // so that requests get their turn
+        waitSteadily(wake_, lock, TURN, [this] { return stopping_.load(); });  // so that requests get their turn
         continue;
       }
       if (unsaved_ && fault.empty())
@@ -279,7 +280,7 @@ private:
         lock.lock();
         save_fault_ = unwritten;
       }
-      wake_.wait_for(lock, PAUSE, [this] { return stopping_.load(); });
+      waitSteadily(wake_, lock, PAUSE, [this] { return stopping_.load(); });
     }
   }
 

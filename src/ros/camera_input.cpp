@@ -47,7 +47,7 @@ CameraInput::CameraInput(const ros::NodeHandle& nh, const ros::NodeHandle& priva
     on_frame_(std::move(on_frame)),
     on_problem_(std::move(on_problem)),
     pairing_(params.queue_size),
-    last_diagnosis_(ros::WallTime::now()),
+    last_diagnosis_(std::chrono::steady_clock::now()),
     synchronizer_(makeSynchronizer())
 {
   const auto queue_size = static_cast<std::uint32_t>(params.queue_size);
@@ -62,8 +62,8 @@ CameraInput::CameraInput(const ros::NodeHandle& nh, const ros::NodeHandle& priva
   });
   image_subscriber_.subscribe(nh, private_nh, "image_raw", params.image_transport, params.queue_size);
   info_subscriber_.subscribe(topics_nh, "camera_info", queue_size);
-  check_timer_ =
-      topics_nh.createWallTimer(ros::WallDuration(CHECK_PERIOD), [this](const ros::WallTimerEvent&) { checkInputs(); });
+  check_timer_ = topics_nh.createSteadyTimer(ros::WallDuration(CHECK_PERIOD),
+                                             [this](const ros::SteadyTimerEvent&) { checkInputs(); });
 }
 
 std::unique_ptr<CameraInput::Synchronizer> CameraInput::makeSynchronizer()
@@ -156,11 +156,6 @@ std::string CameraInput::missing(CameraFrame& frame, const CameraFrame& before) 
 
 CameraFrame CameraInput::latest(double patience) const
 {
-  const std::unique_lock<std::mutex> alone(waiting_mutex_, std::try_to_lock);
-  if (!alone)
-  {
-    return latest();
-  }
   CameraFrame frame;
   const std::string lacking = waitUntilReady(patience, [&] { return missing(frame); });
   if (!lacking.empty())
@@ -173,8 +168,8 @@ CameraFrame CameraInput::latest(double patience) const
 void CameraInput::diagnose(diagnostic_updater::DiagnosticStatusWrapper& status)
 {
   const std::lock_guard<std::mutex> lock(mutex_);
-  const ros::WallTime now = ros::WallTime::now();
-  const double period = (now - last_diagnosis_).toSec();
+  const auto now = std::chrono::steady_clock::now();
+  const double period = std::chrono::duration<double>(now - last_diagnosis_).count();
   rate_ = period > 0.0 ? frames_ / period : 0.0;
   frames_ = 0;
   last_diagnosis_ = now;

@@ -8,6 +8,7 @@
 #include <algorithm>
 #include <atomic>
 #include <cctype>
+#include <chrono>
 #include <csignal>
 #include <limits>
 #include <mutex>
@@ -149,7 +150,7 @@ StatusOutput::StatusOutput(ros::NodeHandle& nh)
 
 void StatusOutput::publish(ServoStatus status)
 {
-  const ros::WallDuration period(0.1);
+  constexpr std::chrono::milliseconds PERIOD(100);
   const bool moving = status.state == ServoStatus::SERVOING || status.state == ServoStatus::ACQUIRING;
   const bool changed =
       status.state != last_.state ||
@@ -158,8 +159,8 @@ void StatusOutput::publish(ServoStatus status)
   {
     ROS_INFO_STREAM(status.reason);
   }
-  const ros::WallTime now = ros::WallTime::now();
-  if (changed || (moving && now - last_time_ >= period))
+  const auto now = std::chrono::steady_clock::now();
+  if (changed || (moving && now - last_time_ >= PERIOD))
   {
     publisher_.publish(status);
     last_time_ = now;

@@ -10,6 +10,7 @@
 #include <utility>
 
 #include <view_servo/ros/node_base.h>
+#include <view_servo/ros/steady_wait.h>
 
 namespace view_servo
 {
@@ -140,7 +141,7 @@ TaskWorker::~TaskWorker()
   {
     expire();
     std::unique_lock<std::mutex> lock(queue_->mutex);
-    has_ended = queue_->changed.wait_for(lock, BEGINNING / 2, [this] { return queue_->has_ended; });
+    has_ended = waitSteadily(queue_->changed, lock, BEGINNING / 2, [this] { return queue_->has_ended; });
   }
   if (has_ended)
   {

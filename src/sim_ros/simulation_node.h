@@ -19,7 +19,7 @@
 #include <ros/param.h>
 #include <ros/rate.h>
 #include <ros/subscriber.h>
-#include <ros/wall_timer.h>
+#include <ros/steady_timer.h>
 #include <sensor_msgs/image_encodings.h>
 #include <opencv2/imgproc.hpp>
 
@@ -265,7 +265,7 @@ private:
   ros::Subscriber command_subscriber_;
   ros::ServiceServer set_pose_service_;
   ros::ServiceServer set_light_service_;
-  ros::WallTimer control_timer_;
+  ros::SteadyTimer control_timer_;
   std::thread camera_thread_;
 };
 

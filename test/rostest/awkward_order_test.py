@@ -30,6 +30,7 @@ from view_servo.srv import SaveView, SaveViewRequest  # noqa: E402
 PAUSE = 0.3        # between one node and the next [s]
 CAMERA_LATE = 5.0  # after the first node [s]
 EARLY = 2.0  # after which a request that came before the camera has no answer yet; view_store waits for 5 s [s]
+CALLERS = 5  # more than a node has threads to answer them
 PATIENCE = 60.0 * graph.SLOWDOWN  # [s]
 
 
@@ -129,17 +130,20 @@ class AwkwardOrder(graph.GraphTest):
                 self.assertTrue(rosservice.get_service_type(service), service)  # asks the node itself
 
     def save_before_the_camera(self):
-        """A request for the camera's image, made before there is one, is answered when there is."""
+        """Requests for the camera's image, made before there is one, are answered when there is, however many wait."""
         rospy.wait_for_service("view_store/save", PATIENCE)
         answers = []
-        request = SaveViewRequest(name="early", overwrite=True)
-        caller = threading.Thread(target=lambda: answers.append(rospy.ServiceProxy("view_store/save", SaveView)(request)))
-        caller.start()
+        requests = [SaveViewRequest(name="early_%d" % i, overwrite=True) for i in range(CALLERS)]
+        callers = [threading.Thread(target=lambda request=request: answers.append(
+            rospy.ServiceProxy("view_store/save", SaveView)(request))) for request in requests]
+        for caller in callers:
+            caller.start()
         time.sleep(EARLY)
         self.assertEqual(answers, [], "there was no camera yet")
         self.camera = Camera()
-        caller.join(PATIENCE)
-        self.assertTrue(answers and answers[0].success, answers)
+        for caller in callers:
+            caller.join(PATIENCE)
+        self.assertEqual([answer.success for answer in answers], CALLERS * [True], answers)
 
     def start_all_before_the_camera(self, file, arguments, services):
         self.start_backwards(self.load(file, *arguments))

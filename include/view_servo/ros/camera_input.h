@@ -10,9 +10,10 @@
 #include <message_filters/subscriber.h>
 #include <message_filters/time_synchronizer.h>
 #include <ros/node_handle.h>
-#include <ros/wall_timer.h>
+#include <ros/steady_timer.h>
 #include <sensor_msgs/CameraInfo.h>
 
+#include <chrono>
 #include <functional>
 #include <memory>
 #include <mutex>
@@ -77,11 +78,9 @@ public:
   std::string problem() const;
 
   /**
-   * Waits for latest(), as a camera may start later than its node. The wait is by a steady clock, and logged. Only one
-   * caller waits at a time, and others get what latest() gives at once: each one that waits blocks one of the spinner's
-   * few threads, which also deliver the images.
-   * @param patience longest wait [s].
-   * @throws ImageError when there is still no usable frame after that time; at once for a caller who does not wait.
+   * Waits for latest(), as a camera may start later than its node. The wait is by a steady clock, and logged. Not to be
+   * called by the threads that deliver images.
+   * @param patience longest wait [s]. @throws ImageError when there is still no usable frame after that time.
    */
   CameraFrame latest(double patience) const;
 
@@ -114,8 +113,7 @@ private:
   CameraInputParams params_;
   Callback on_frame_;
   std::function<void(const std::string&)> on_problem_;
-  mutable std::mutex waiting_mutex_;  // held by the one who waits; taken before mutex_
-  mutable std::mutex mutex_;          // guards what follows, up to the other mutex
+  mutable std::mutex mutex_;  // guards what follows, up to the other mutex
   CameraFrame latest_;
   std::string fault_;    // of the last pair
   std::string problem_;  // why the last frame was not usable, or none came
@@ -125,7 +123,7 @@ private:
   int pairs_ = 0;      // images and camera_info with one stamp, since the last check
   double rate_ = 0.0;  // of usable frames [Hz]
   int frames_ = 0;     // usable, since the last diagnosis
-  ros::WallTime last_diagnosis_;
+  std::chrono::steady_clock::time_point last_diagnosis_;
 
   std::mutex pairing_mutex_;  // guards what follows, up to the transport; taken before mutex_
   int unpaired_ = 0;          // messages since the last pair
@@ -133,7 +131,7 @@ private:
 
   CameraImageSubscriber image_subscriber_;
   message_filters::Subscriber<sensor_msgs::CameraInfo> info_subscriber_;
-  ros::WallTimer check_timer_;
+  ros::SteadyTimer check_timer_;
 };
 
 }  // namespace view_servo

@@ -7,10 +7,10 @@
 #include "view_servo/ros/parameters.h"
 
 #include <ros/publisher.h>
-#include <ros/wall_timer.h>
 #include <std_srvs/SetBool.h>
 
 #include <atomic>
+#include <chrono>
 #include <cstdint>
 #include <functional>
 #include <string>
@@ -73,7 +73,7 @@ public:
 private:
   ros::Publisher publisher_;
   ServoStatus last_;
-  ros::WallTime last_time_;
+  std::chrono::steady_clock::time_point last_time_;
 };
 
 /** A status without errors or inliers, stamped now. */
@@ -164,7 +164,10 @@ int runControlNode(int argc, char** argv, const std::string& name)
   detail::deferShutdown();
   try
   {
-    Node node(nh, ros::NodeHandle("~"));
+    ros::NodeHandle private_nh("~");
+    RequestThreads requests(private_nh);
+    Node node(nh, private_nh);
+    requests.start();
     ros::AsyncSpinner spinner(CONTROL_NODE_THREADS);
     spinner.start();
     while (ros::ok() && !detail::shutdownRequested())
@@ -173,6 +176,7 @@ int runControlNode(int argc, char** argv, const std::string& name)
     }
     guarded("the end", [&] { node.stop(); });
     waitForLastCommand();
+    requests.stop();
     spinner.stop();
     ros::shutdown();
     return 0;

@@ -566,7 +566,7 @@ private:
   ros::ServiceServer enable_service_;
   bool held_ = false;  // by `stop`
   std::thread goal_thread_;
-  ros::WallTimer control_timer_;
+  ros::SteadyTimer control_timer_;
   std::unique_ptr<LiveParameters> live_parameters_;
 };
 

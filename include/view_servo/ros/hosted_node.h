@@ -3,6 +3,7 @@
 #pragma once
 
 #include "view_servo/ros/control_node.h"
+#include "view_servo/ros/node_base.h"
 #include "view_servo/ros/node_type.h"
 
 #include <ros/callback_queue.h>
@@ -14,7 +15,7 @@
 namespace view_servo
 {
 /**
- * A node in a process that it shares with others, as a nodelet does. It has a queue and threads of its own, as many as
+ * A node in a process that it shares with others, as a nodelet does. It has queues and threads of its own, as many as
  * in a process of its own: a slow service or callback of one node keeps no other waiting, and no driver's control.
  *
  * Where the node drives a robot, zero is sent before this ends, and before the process does by a signal or by the
@@ -34,6 +35,7 @@ public:
 
 private:
   ros::CallbackQueue queue_;
+  RequestThreads requests_;
   std::unique_ptr<RunningNode> node_;
   std::unique_ptr<StopBeforeShutdown> stop_before_shutdown_;  // of a driver
   ros::AsyncSpinner spinner_;

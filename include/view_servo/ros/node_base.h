@@ -5,15 +5,16 @@
 #include "view_servo/parameters/error_text.h"
 
 #include <diagnostic_updater/diagnostic_updater.h>
+#include <ros/callback_queue.h>
 #include <ros/console.h>
 #include <ros/init.h>
 #include <ros/node_handle.h>
 #include <ros/service_server.h>
 #include <ros/spinner.h>
+#include <ros/steady_timer.h>
 #include <ros/subscriber.h>
 #include <ros/time.h>
 #include <ros/transport_hints.h>
-#include <ros/wall_timer.h>
 #include <boost/function.hpp>
 #include <boost/shared_ptr.hpp>
 
@@ -199,12 +200,15 @@ protected:
     return nh_.subscribe<Message>(topic, queue_size, callback, ros::VoidConstPtr(), hints);
   }
 
-  /** Calls `body` every `period` [s] of wall time; what it throws is logged. */
+  /**
+   * Calls `body` every `period` [s] of a steady clock, whatever happens to the system's or to ROS'; what it throws is
+   * logged.
+   */
   template <typename Body>
-  ros::WallTimer every(double period, const std::string& what, Body body)
+  ros::SteadyTimer every(double period, const std::string& what, Body body)
   {
-    return nh_.createWallTimer(ros::WallDuration(period),
-                               [what, body](const ros::WallTimerEvent&) { guarded(what, body); });
+    return nh_.createSteadyTimer(ros::WallDuration(period),
+                                 [what, body](const ros::SteadyTimerEvent&) { guarded(what, body); });
   }
 
   ros::NodeHandle nh_;
@@ -212,11 +216,42 @@ protected:
   diagnostic_updater::Updater diagnostics_;
 
 private:
-  ros::WallTimer diagnostics_timer_;
+  ros::SteadyTimer diagnostics_timer_;
 };
 
-/** Threads that call a node's callbacks: a few, so that images go on arriving while a service works. */
+/** Threads that call a node's callbacks but for requests. */
 constexpr std::uint32_t NODE_THREADS = 3;
+
+/**
+ * Threads that answer the requests to a node, and do nothing else: however many callers wait for slow answers, images
+ * and odometry go on arriving, and what a request waits for comes.
+ */
+class RequestThreads
+{
+public:
+  /** @param private_nh of the node, which is made with it next: it offers its services by this handle. */
+  explicit RequestThreads(ros::NodeHandle& private_nh) : spinner_(COUNT, &queue_)
+  {
+    private_nh.setCallbackQueue(&queue_);
+  }
+
+  /** Begins to answer. To be called once the node has been made. */
+  void start()
+  {
+    spinner_.start();
+  }
+  /** Waits for requests that are being worked on, and answers no more. To be called before the node's end. */
+  void stop()
+  {
+    spinner_.stop();
+  }
+
+private:
+  static constexpr std::uint32_t COUNT = 3;
+
+  ros::CallbackQueue queue_;
+  ros::AsyncSpinner spinner_;
+};
 
 /**
  * Answers a node's command line without a master when it asks for help, or has words that are none of ROS, as _rate=5.
@@ -225,7 +260,7 @@ constexpr std::uint32_t NODE_THREADS = 3;
 std::optional<int> answerCommandLine(int argc, char** argv, const std::string& name);
 
 /**
- * A node's main(): spins on NODE_THREADS.
+ * A node's main(): spins on NODE_THREADS and RequestThreads.
  * @return 1 when the node refuses to start; else as answerCommandLine().
  */
 template <typename Node>
@@ -241,8 +276,12 @@ int runNode(int argc, char** argv, const std::string& name)
   const ros::NodeHandle nh;  // outlives the node: without any handle, ROS ends and the last messages are lost
   try
   {
-    Node node(nh, ros::NodeHandle("~"));
+    ros::NodeHandle private_nh("~");
+    RequestThreads requests(private_nh);
+    Node node(nh, private_nh);
+    requests.start();
     ros::MultiThreadedSpinner(NODE_THREADS).spin();
+    requests.stop();
     return 0;
   }
   catch (const std::exception& error)

@@ -12,6 +12,7 @@
 #include "view_servo/ros/live_parameters.h"
 #include "view_servo/ros/node_base.h"
 #include "view_servo/ros/parameters.h"
+#include "view_servo/ros/steady_wait.h"
 #include "view_servo/ros/view_choice.h"
 #include "view_servo/views/overlay.h"
 #include "view_servo/views/prepared_image.h"
@@ -369,8 +370,7 @@ private:
       }
       if (frame)
       {
-        // The time is looked at, too: before GCC 10 such a wait goes by the system's clock, which may be set back.
-        wake_.wait_until(lock, next, [&] { return stopping_ || renewed_ || Clock::now() >= next; });
+        waitSteadily(wake_, lock, next, [this] { return stopping_ || renewed_; });
       }
     }
   }
