@@ -116,6 +116,11 @@ class Graph:
         """Publishers, subscribers, services: each a dictionary from name to nodes."""
         return [dict(part) for part in self.master.getSystemState(CALLER)[2]]
 
+    def pid_of(self, node):
+        """The process of a node, which it tells itself."""
+        with xmlrpc.client.ServerProxy(self.master.lookupNode(CALLER, node)[2]) as server:
+            return server.getPid(CALLER)[2]
+
     def topic_types(self):
         return dict(self.master.getTopicTypes(CALLER)[2])
 

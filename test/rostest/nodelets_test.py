@@ -9,7 +9,6 @@ import signal
 import sys
 import unittest
 import xml.etree.ElementTree as tree
-import xmlrpc.client
 
 import rospy
 from geometry_msgs.msg import Twist
@@ -54,10 +53,6 @@ class Nodelets(graph.GraphTest):
     def provider(self, service):
         """The node that offers a service; empty: none."""
         return "".join(self.graph.state()[2].get(service, []))
-
-    def pid(self, node):
-        with xmlrpc.client.ServerProxy(self.graph.master.lookupNode(graph.CALLER, node)[2]) as server:
-            return server.getPid(graph.CALLER)[2]
 
     def start_manager(self):
         manager = self.graph.start("rosrun", "nodelet", "nodelet", "manager", "__name:=" + MANAGER)
@@ -125,17 +120,17 @@ class Nodelets(graph.GraphTest):
         return manager
 
     def test_zero_is_sent_when_a_driver_is_unloaded_and_the_manager_goes_on(self):
-        manager = self.assert_zero_is_sent(lambda: os.kill(self.pid("/homing"), signal.SIGINT))
+        manager = self.assert_zero_is_sent(lambda: os.kill(self.graph.pid_of("/homing"), signal.SIGINT))
         self.assertIsNone(manager.poll(), self.graph.log())
         self.graph.run("rosnode kill /" + MANAGER)
         self.assertEqual(manager.wait(PATIENCE), 0, self.graph.log())
 
     def test_zero_is_sent_when_the_manager_is_interrupted(self):
-        manager = self.assert_zero_is_sent(lambda: os.kill(self.pid("/" + MANAGER), signal.SIGINT))
+        manager = self.assert_zero_is_sent(lambda: os.kill(self.graph.pid_of("/" + MANAGER), signal.SIGINT))
         self.assertEqual(manager.wait(PATIENCE), 0, self.graph.log())
 
     def test_zero_is_sent_when_the_manager_is_terminated(self):
-        manager = self.assert_zero_is_sent(lambda: os.kill(self.pid("/" + MANAGER), signal.SIGTERM))
+        manager = self.assert_zero_is_sent(lambda: os.kill(self.graph.pid_of("/" + MANAGER), signal.SIGTERM))
         self.assertEqual(manager.wait(PATIENCE), 0, self.graph.log())
 
     def test_zero_is_sent_when_the_manager_is_ended_by_rosnode_kill(self):

@@ -8,7 +8,6 @@ import signal
 import sys
 import time
 import unittest
-import xmlrpc.client
 
 import rospy
 from geometry_msgs.msg import Twist, TwistStamped
@@ -40,14 +39,11 @@ class StoppedPeers(graph.GraphTest):
         for pid in self.stopped:
             os.kill(pid, signal.SIGCONT)
 
-    def pid_of(self, node):
-        return xmlrpc.client.ServerProxy(self.graph.master.lookupNode(graph.CALLER, node)[2]).getPid(graph.CALLER)[2]
-
     def moves(self):
         return bool(self.commands) and not is_zero(self.commands[-1][1])
 
     def stop(self, nodes, master=False):
-        self.stopped = [self.pid_of(node) for node in nodes]
+        self.stopped = [self.graph.pid_of(node) for node in nodes]
         if master:
             self.stopped.append(self.graph.master.getPid(graph.CALLER)[2])
         for pid in self.stopped:
@@ -60,7 +56,7 @@ class StoppedPeers(graph.GraphTest):
 
     def kill(self, nodes):
         for node in nodes:
-            os.kill(self.pid_of(node), signal.SIGKILL)
+            os.kill(self.graph.pid_of(node), signal.SIGKILL)
         return time.monotonic()
 
     def last_motion(self):

@@ -20,7 +20,6 @@ import threading
 import time
 import unittest
 import unittest.mock
-import xmlrpc.client
 
 ROOT = os.path.realpath(os.path.join(os.path.dirname(os.path.abspath(__file__)), "..", ".."))
 sys.path.insert(0, os.path.join(ROOT, "test", "docs"))
@@ -433,9 +432,6 @@ class ViewCommands(graph.GraphTest):
         self.assertEqual(status, 0, text)
         graph.wait_until("a pose", lambda: self.pose is not None and abs(self.pose.x - self.goal.x - x) < 0.05)
 
-    def pid_of_homing(self):
-        return xmlrpc.client.ServerProxy(self.graph.master.lookupNode(graph.CALLER, "/base/homing")[2]).getPid(graph.CALLER)[2]
-
     def drive(self):
         """A `view go` that drives."""
         process = self.begin("go", "dock", "--enable", "--patience", "2", "__ns:=/base")
@@ -461,7 +457,7 @@ class ViewCommands(graph.GraphTest):
             self.assertIn("disabled; no goal is left", self.view("stop __ns:=/base"))
             self.end(process, NOT_DONE, "not arrived: ")
             process = self.drive()
-            pid = self.pid_of_homing()
+            pid = self.graph.pid_of("/base/homing")
             os.kill(pid, signal.SIGSTOP)
             self.end(process, NOT_DONE, "/base/homing has been silent for 2 s.*emergency stop")
             os.kill(pid, signal.SIGCONT)
