@@ -16,17 +16,20 @@
 #include "view_servo/ros/node_type_of.h"
 #include "view_servo/ros/parameters.h"
 #include "view_servo/ros/transform_source.h"
+#include "view_servo/views/route_store.h"
 #include "view_servo/views/self_repetition.h"
 #include "view_servo/views/view_store.h"
 
 #include <sensor_msgs/image_encodings.h>
 #include <Eigen/Core>
 
+#include <algorithm>
 #include <cmath>
 #include <mutex>
 #include <optional>
 #include <stdexcept>
 #include <string>
+#include <vector>
 
 namespace view_servo
 {
@@ -46,6 +49,7 @@ namespace view_servo
  *  - `~save` (view_servo/SaveView): stores a view;
  *  - `~list` (view_servo/ListViews): names the readable views and the damaged ones;
  *  - `~delete` (view_servo/DeleteView), `~get` (view_servo/GetView).
+ * A view that a route needs is neither replaced nor deleted.
  *
  * Other nodes read views from the directory themselves, not through this node: they go on without it, and see a view
  * as soon as it is saved because the store is safe for several processes as long as one of them writes.
@@ -59,7 +63,8 @@ public:
       transforms_(nh),
       camera_(nh, private_nh, params_.camera),
       sources_(params_.sources, camera_),
-      store_(sources_.store())
+      store_(sources_.store()),
+      routes_(store_.directory())
   {
     learn_publisher_ = nh_.advertise<WantedView>("learn_view", 1);
     save_service_ = serve("save", &ViewStoreNode::save, this);
@@ -85,6 +90,10 @@ private:
     view.pose = source.pose ? source.pose : lookUpPose(source.header);
     const std::string warning = [&] {
       const std::lock_guard<std::mutex> lock(write_mutex_);
+      if (request.overwrite)
+      {
+        requireOnNoRoute("replace", view.name);
+      }
       return store_.save(view, request.overwrite);
     }();
     const std::string lack = lackOfLight(view.region.empty() ? view.image : view.image(view.region));
@@ -131,6 +140,7 @@ private:
   {
     const std::string warning = [&] {
       const std::lock_guard<std::mutex> lock(write_mutex_);
+      requireOnNoRoute("remove", request.name);
       return store_.remove(request.name);
     }();
     response.success = true;
@@ -153,6 +163,18 @@ private:
       response.pose = toPoseStamped(*view.pose, header.stamp);
     }
     response.success = true;
+  }
+
+  /** @throws ViewStoreError when a view is there and a route needs it: that could not be followed any more. */
+  void requireOnNoRoute(const std::string& action, const std::string& view) const
+  {
+    const std::vector<std::string> routes = routes_.routesWith(view);
+    const std::vector<std::string> names = store_.names();
+    if (!routes.empty() && std::binary_search(names.begin(), names.end(), view))
+    {
+      throw ViewStoreError("cannot " + action + " view '" + view + "': route '" + routes[0] +
+                           "' needs it as it is; delete the route first: rosrun view_servo routes delete " + routes[0]);
+    }
   }
 
   /** The pose of an image's frame when the image was taken, where tf knows it or learns it within a moment. */
@@ -179,6 +201,7 @@ private:
   CameraInput camera_;
   ImageSourceReader sources_;
   const ViewStore& store_;
+  const RouteStore routes_;
   std::mutex write_mutex_;  // one writer at a time
   ros::Publisher learn_publisher_;
   ros::ServiceServer save_service_;

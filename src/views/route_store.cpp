@@ -133,6 +133,19 @@ std::optional<Route> read(const fs::path& directory, const std::string& name)
   return route;
 }
 
+/** Sorted names of the routes that have a file, readable or not. @throws RouteStoreError. */
+std::vector<std::string> findNames(const fs::path& directory)
+{
+  try
+  {
+    return namesOfYamlFiles(directory);
+  }
+  catch (const fs::filesystem_error& error)
+  {
+    throw RouteStoreError(std::string("cannot list routes: ") + oneLine(error));
+  }
+}
+
 /** Copies what has been learnt of a view; what is damaged of it is left out, as it is learnt anew. */
 void copyStructure(const ViewStore& from, const ViewStore& to, const std::string& view)
 {
@@ -226,46 +239,51 @@ bool RouteStore::has(const std::string& name) const
   return isValidRouteName(name) && fs::exists(fs::symlink_status(yamlPath(directory_, name), ignored));
 }
 
+std::vector<std::string> RouteStore::routesWith(const std::string& view) const
+{
+  std::vector<std::string> found;
+  for (const std::string& name : findNames(directory_))
+  {
+    try
+    {
+      const std::optional<Route> route = read(directory_, name);
+      if (route && std::any_of(route->stops.begin(), route->stops.end(),
+                               [&](const RouteStop& stop) { return stop.view == view; }))
+      {
+        found.push_back(name);
+      }
+    }
+    catch (const std::exception&)
+    {
+      // It does not say which views it needs.
+    }
+  }
+  return found;
+}
+
 std::string RouteStore::routeWith(const std::string& view) const
 {
-  const Listing listing = list();
-  std::string found;
-  for (const std::string& name : listing.names)
+  const std::vector<std::string> found = routesWith(view);
+  if (found.size() > 1)
   {
-    const std::vector<RouteStop> stops = load(name).stops;
-    if (std::any_of(stops.begin(), stops.end(), [&](const RouteStop& stop) { return stop.view == view; }))
-    {
-      if (!found.empty())
-      {
-        std::string reason = "view '" + view;
-        reason.append("' is on route '").append(found).append("' and on route '").append(name);
-        throw RouteStoreError(reason + "': name the one to follow");
-      }
-      found = name;
-    }
+    std::string reason = "view '" + view;
+    reason.append("' is on route '").append(found[0]).append("' and on route '").append(found[1]);
+    throw RouteStoreError(reason + "': name the one to follow");
   }
   if (found.empty())
   {
+    const Listing listing = list();
     const std::string unknown =
         listing.damaged.empty() ? "" : ", as far as is known: route '" + listing.damaged[0].name + "' is damaged";
     throw RouteStoreError("view '" + view + "' is on no route" + unknown);
   }
-  return found;
+  return found[0];
 }
 
 RouteStore::Listing RouteStore::list() const
 {
   Listing listing;
-  std::vector<std::string> names;
-  try
-  {
-    names = namesOfYamlFiles(directory_);
-  }
-  catch (const fs::filesystem_error& error)
-  {
-    throw RouteStoreError(std::string("cannot list routes: ") + oneLine(error));
-  }
-  for (const std::string& name : names)
+  for (const std::string& name : findNames(directory_))
   {
     try
     {

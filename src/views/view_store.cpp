@@ -109,23 +109,18 @@ void requireFinite(bool finite, const std::string& what)
   }
 }
 
-/** @throws std::invalid_argument saying what cannot be stored. */
-void check(const StoredView& view)
+/** Of a view whose image is 8-bit grey and of this size. @throws std::invalid_argument saying what cannot be stored. */
+void check(const StoredView& view, const cv::Size& size)
 {
-  const cv::Mat& image = view.image;
-  if (image.empty() || image.type() != CV_8UC1)
+  const std::int64_t pixels = static_cast<std::int64_t>(size.width) * size.height;
+  if (std::min(size.width, size.height) < MIN_IMAGE_SIDE || pixels > MAX_IMAGE_PIXELS)
   {
-    throw std::invalid_argument("its image is not 8-bit grey");
-  }
-  const std::int64_t pixels = static_cast<std::int64_t>(image.cols) * image.rows;
-  if (std::min(image.cols, image.rows) < MIN_IMAGE_SIDE || pixels > MAX_IMAGE_PIXELS)
-  {
-    throw std::invalid_argument("its image is " + std::to_string(image.cols) + " x " + std::to_string(image.rows) +
+    throw std::invalid_argument("its image is " + std::to_string(size.width) + " x " + std::to_string(size.height) +
                                 " pixels, which is too " + (pixels > MAX_IMAGE_PIXELS ? "large" : "small"));
   }
   const cv::Rect& region = view.region;
   if (!region.empty() &&
-      (region.x < 0 || region.y < 0 || region.width > image.cols - region.x || region.height > image.rows - region.y))
+      (region.x < 0 || region.y < 0 || region.width > size.width - region.x || region.height > size.height - region.y))
   {
     throw std::invalid_argument("its region of interest leaves the image");
   }
@@ -142,6 +137,16 @@ void check(const StoredView& view)
   {
     requireFinite(view.pose->position.allFinite() && view.pose->orientation.coeffs().allFinite(), "its pose");
   }
+}
+
+/** @throws std::invalid_argument saying what cannot be stored. */
+void check(const StoredView& view)
+{
+  if (view.image.empty() || view.image.type() != CV_8UC1)
+  {
+    throw std::invalid_argument("its image is not 8-bit grey");
+  }
+  check(view, view.image.size());
 }
 
 /** Row-major, as sensor_msgs/CameraInfo has them. */
@@ -254,10 +259,16 @@ StoredView fieldsFromYaml(const YAML::Node& node)
   return view;
 }
 
-/**
- * @throws Damage, or the error of the library that could not make sense of a file; empty when there is no such view.
- */
-std::optional<StoredView> readView(const fs::path& directory, const std::string& name)
+/** The files of a view, both in agreement with their checksums, and all but the pixels of what they hold. */
+struct ViewFiles
+{
+  StoredView view;
+  std::string image_file;  ///< name of the image's file, which has its checksum
+  std::string png;         ///< its bytes
+};
+
+/** Empty when there is no such view. @throws Damage, or what yaml-cpp throws. */
+std::optional<ViewFiles> readFiles(const fs::path& directory, const std::string& name)
 {
   std::optional<std::string> text = readFile(yamlPath(directory, name));
   while (text)
@@ -270,11 +281,9 @@ std::optional<StoredView> readView(const fs::path& directory, const std::string&
       {
         throw Damage("its image " + image_file + " does not agree with the checksum in its name");
       }
-      StoredView view = fieldsFromYaml(node);
-      view.name = name;
-      view.image = decodeGreyImage(*png, image_file);
-      check(view);
-      return view;
+      ViewFiles files{ fieldsFromYaml(node), image_file, *std::move(png) };
+      files.view.name = name;
+      return files;
     }
     // The image may be gone because the view was saved anew since its yaml file was read.
     std::optional<std::string> text_now = readFile(yamlPath(directory, name));
@@ -285,6 +294,21 @@ std::optional<StoredView> readView(const fs::path& directory, const std::string&
     text = std::move(text_now);
   }
   return std::nullopt;
+}
+
+/**
+ * @throws Damage, or the error of the library that could not make sense of a file; empty when there is no such view.
+ */
+std::optional<StoredView> readView(const fs::path& directory, const std::string& name)
+{
+  std::optional<ViewFiles> files = readFiles(directory, name);
+  if (!files)
+  {
+    return std::nullopt;
+  }
+  files->view.image = decodeGreyImage(files->png, files->image_file);
+  check(files->view);
+  return std::move(files->view);
 }
 
 [[noreturn]] void fail(const std::string& action, const std::string& name, const std::string& reason)
@@ -489,20 +513,30 @@ std::vector<std::string> ViewStore::names() const
 ViewStore::Listing ViewStore::list() const
 {
   Listing listing;
+  const std::lock_guard<std::mutex> lock(decoded_->mutex);
+  std::map<std::string, cv::Size> decoded;
   for (const std::string& name : findNames(directory_))
   {
     try
     {
-      if (readView(directory_, name))  // else it was removed meanwhile
+      const std::optional<ViewFiles> files = readFiles(directory_, name);
+      if (!files)
       {
-        listing.names.push_back(name);
+        continue;  // it was removed meanwhile
       }
+      const auto known = decoded_->sizes.find(files->image_file);
+      const cv::Size size =
+          known != decoded_->sizes.end() ? known->second : decodeGreyImage(files->png, files->image_file).size();
+      check(files->view, size);
+      decoded.emplace(files->image_file, size);
+      listing.names.push_back(name);
     }
     catch (const std::exception& error)
     {
       listing.damaged.push_back({ name, oneLine(error) });
     }
   }
+  decoded_->sizes = std::move(decoded);
   return listing;
 }
 

@@ -9,6 +9,7 @@
 #include "view_servo/ListViews.h"
 #include "view_servo/SaveView.h"
 #include "view_servo/ros/call_service.h"
+#include "view_servo/views/route_store.h"
 #include "view_servo/views/view_store.h"
 
 #include <geometry_msgs/TransformStamped.h>
@@ -18,6 +19,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <filesystem>
 #include <string>
 #include <vector>
 
@@ -188,6 +190,33 @@ TEST_F(ViewStoreNodeTest, OverwritesOnlyWhenAsked)
   request.overwrite = true;
   ASSERT_TRUE(call<SaveView>("save", request).success);
   EXPECT_EQ(get("once").image.data, request.source.image.data);
+}
+
+TEST_F(ViewStoreNodeTest, KeepsAViewThatARouteNeeds)
+{
+  for (const char* name : { "hall_001", "hall_002" })
+  {
+    ASSERT_TRUE(call<SaveView>("save", imageRequest(name)).success);
+  }
+  const RouteStore routes(viewsDir("view_store"));
+  routes.save({ "hall", "odom", { { "hall_001", {}, 1.0 }, { "hall_002", { 1.0, 0.0, 0.0 }, 2.0 } } });
+  const std::string revision = routes.views().revision("hall_002");
+
+  DeleteView::Request request;
+  request.name = "hall_002";
+  const DeleteView::Response deleted = call<DeleteView>("delete", request);
+  EXPECT_FALSE(deleted.success);
+  EXPECT_NE(deleted.message.find("route 'hall' needs it"), std::string::npos) << deleted.message;
+  const SaveView::Response replaced = call<SaveView>("save", imageRequest("hall_002"));
+  EXPECT_FALSE(replaced.success);
+  EXPECT_NE(replaced.message.find("route 'hall' needs it"), std::string::npos) << replaced.message;
+  EXPECT_EQ(routes.views().revision("hall_002"), revision);
+
+  // What the route does not name, and what is not there, is not the route's.
+  ASSERT_TRUE(call<SaveView>("save", imageRequest("hall_003")).success);
+  std::filesystem::remove(viewsDir("view_store") / "hall_002.yaml");
+  EXPECT_TRUE(call<SaveView>("save", imageRequest("hall_002")).success);
+  EXPECT_EQ(routes.remove("hall"), "");
 }
 
 TEST_F(ViewStoreNodeTest, ReportsADamagedViewByNameAndKeepsTheOthers)

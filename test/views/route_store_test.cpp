@@ -217,6 +217,9 @@ TEST_F(RouteStoreTest, FindsTheRouteThatAViewIsOn)
   EXPECT_EQ(store_.routeWith("lab_003"), "lab");
   EXPECT_ERROR(store_.routeWith("hall_001"),
                "view 'hall_001' is on route 'hall' and on route 'lab': name the one to follow");
+  EXPECT_EQ(store_.routesWith("hall_001"), (std::vector<std::string>{ "hall", "lab" }));
+  EXPECT_EQ(store_.routesWith("lab_003"), std::vector<std::string>{ "lab" });
+  EXPECT_EQ(store_.routesWith("none"), std::vector<std::string>());
   store_.rename("lab", "attic");
   EXPECT_EQ(store_.routeWith("lab_003"), "attic") << "views keep their names";
   std::ofstream(file("attic")) << "not a route";

@@ -56,6 +56,8 @@ public:
   /** Whether there is a file of that name, damaged or not. */
   bool has(const std::string& name) const;
 
+  /** The routes that name a view, sorted; those that cannot be read are left out. @throws RouteStoreError as list(). */
+  std::vector<std::string> routesWith(const std::string& view) const;
   /**
    * The name of the route that a view is on. @throws RouteStoreError when it is on none that can be read, or on
    * several.

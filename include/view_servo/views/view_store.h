@@ -11,6 +11,8 @@
 
 #include <filesystem>
 #include <map>
+#include <memory>
+#include <mutex>
 #include <optional>
 #include <stdexcept>
 #include <string>
@@ -122,14 +124,22 @@ public:
     std::vector<std::string> names;  ///< readable views, sorted
     std::vector<Damaged> damaged;    ///< sorted by name
   };
-  /** Checks every view's yaml and image. */
+  /** Checks every view's yaml and image. An image that was decoded by the last call is not decoded again. */
   Listing list() const;
 
   /** @return as save(). @throws ViewStoreError when there is no such view; damaged views can be removed. */
   std::string remove(const std::string& name) const;
 
 private:
+  /** What list() has decoded: sizes of images, by the names of their files, which have checksums in them. */
+  struct Decoded
+  {
+    std::mutex mutex;
+    std::map<std::string, cv::Size> sizes;
+  };
+
   std::filesystem::path directory_;
+  std::shared_ptr<Decoded> decoded_ = std::make_shared<Decoded>();  // copies of a store share it
 };
 
 }  // namespace view_servo
