@@ -39,7 +39,8 @@ namespace view_servo
  * Its private parameters: see ViewStoreNodeParams.
  *
  * Subscribes:
- *  - `image_raw` (sensor_msgs/Image), `camera_info` (sensor_msgs/CameraInfo), `/tf`, `/tf_static`.
+ *  - `image_raw` (sensor_msgs/Image), `camera_info` (sensor_msgs/CameraInfo), for a minute from its start and from each
+ *    request on that needs them; `/tf`, `/tf_static`.
  *
  * Publishes:
  *  - `learn_view` (view_servo/WantedView): a view that was saved to be learnt, for homing;
@@ -66,6 +67,7 @@ public:
       store_(sources_.store()),
       routes_(store_.directory())
   {
+    camera_.connectWhenAsked(params_.idle_timeout);
     learn_publisher_ = nh_.advertise<WantedView>("learn_view", 1);
     save_service_ = serve("save", &ViewStoreNode::save, this);
     list_service_ = serve("list", &ViewStoreNode::list, this);

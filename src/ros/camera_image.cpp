@@ -138,4 +138,10 @@ void CameraImageSubscriber::subscribe(const ros::NodeHandle& nh, const ros::Node
   packed_subscriber_ = topics_nh.subscribe<sensor_msgs::CompressedImage>(topic_, length, on_image);
 }
 
+void CameraImageSubscriber::shutdown()
+{
+  image_subscriber_.shutdown();
+  packed_subscriber_.shutdown();
+}
+
 }  // namespace view_servo

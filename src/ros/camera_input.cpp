@@ -4,6 +4,7 @@
 
 #include "view_servo/images/image_io.h"
 #include "view_servo/parameters/error_text.h"
+#include "view_servo/parameters/seconds_since.h"
 #include "view_servo/ros/node_base.h"
 #include "view_servo/ros/readiness.h"
 
@@ -20,6 +21,7 @@ namespace view_servo
 namespace
 {
 constexpr double CHECK_PERIOD = 5.0;   // [s]
+constexpr double IDLE_PERIOD = 1.0;    // from one look at whether somebody has asked to the next [s]
 constexpr double ERROR_PERIOD = 10.0;  // [s]
 
 double steadySeconds()
@@ -43,15 +45,15 @@ std::vector<Parameter> parameters(CameraInputParams& params)
 
 CameraInput::CameraInput(const ros::NodeHandle& nh, const ros::NodeHandle& private_nh, const CameraInputParams& params,
                          Callback on_frame, std::function<void(const std::string&)> on_problem)
-  : params_(params),
+  : nh_(nh),
+    private_nh_(private_nh),
+    params_(params),
     on_frame_(std::move(on_frame)),
     on_problem_(std::move(on_problem)),
     pairing_(params.queue_size),
     last_diagnosis_(std::chrono::steady_clock::now()),
     synchronizer_(makeSynchronizer())
 {
-  const auto queue_size = static_cast<std::uint32_t>(params.queue_size);
-  ros::NodeHandle topics_nh(nh);
   image_subscriber_.registerCallback([this](const CameraImageConstPtr& image) {
     pair([&](Synchronizer& synchronizer) { synchronizer.add0(image); });
     onImage(image->header.stamp);
@@ -60,10 +62,54 @@ CameraInput::CameraInput(const ros::NodeHandle& nh, const ros::NodeHandle& priva
     pair([&](Synchronizer& synchronizer) { synchronizer.add1(info); });
     onInfo(info->header.stamp);
   });
-  image_subscriber_.subscribe(nh, private_nh, "image_raw", params.image_transport, params.queue_size);
-  info_subscriber_.subscribe(topics_nh, "camera_info", queue_size);
-  check_timer_ = topics_nh.createSteadyTimer(ros::WallDuration(CHECK_PERIOD),
-                                             [this](const ros::SteadyTimerEvent&) { checkInputs(); });
+  {
+    const std::lock_guard<std::mutex> lock(connection_mutex_);
+    connect();
+  }
+  topics_ = { image_subscriber_.getTopic(), info_subscriber_.getTopic() };
+  ros::NodeHandle timers(nh);
+  check_timer_ = timers.createSteadyTimer(ros::WallDuration(CHECK_PERIOD),
+                                          [this](const ros::SteadyTimerEvent&) { checkInputs(); });
+}
+
+void CameraInput::connect()
+{
+  ros::NodeHandle nh(nh_);
+  image_subscriber_.subscribe(nh_, private_nh_, "image_raw", params_.image_transport, params_.queue_size);
+  info_subscriber_.subscribe(nh, "camera_info", static_cast<std::uint32_t>(params_.queue_size));
+  connected_ = true;
+}
+
+void CameraInput::connectWhenAsked(double idle)
+{
+  const std::lock_guard<std::mutex> lock(connection_mutex_);
+  idle_ = idle;
+  idle_timer_ = ros::NodeHandle(nh_).createSteadyTimer(ros::WallDuration(IDLE_PERIOD),
+                                                       [this](const ros::SteadyTimerEvent&) { letGo(); });
+  asked_ = std::chrono::steady_clock::now();
+}
+
+void CameraInput::letGo()
+{
+  const std::lock_guard<std::mutex> lock(connection_mutex_);
+  if (!connected_ || waiting_ > 0 || secondsSince(asked_) < idle_)
+  {
+    return;
+  }
+  image_subscriber_.shutdown();  // waits for what it calls
+  info_subscriber_.unsubscribe();
+  connected_ = false;
+  {
+    const std::lock_guard<std::mutex> pairing_lock(pairing_mutex_);
+    synchronizer_ = makeSynchronizer();
+    unpaired_ = 0;
+  }
+  const std::lock_guard<std::mutex> input_lock(mutex_);
+  latest_ = CameraFrame();
+  pairing_ = PairingWatch(params_.queue_size);
+  images_ = infos_ = pairs_ = 0;
+  fault_.clear();
+  problem_.clear();
 }
 
 std::unique_ptr<CameraInput::Synchronizer> CameraInput::makeSynchronizer()
@@ -121,7 +167,7 @@ void CameraInput::onInfo(const ros::Time& stamp)
 
 std::string CameraInput::noteUnpaired(const std::optional<CameraTraffic>& traffic)
 {
-  return traffic ? problem_ = faultOf(*traffic, topics()) : "";
+  return traffic ? problem_ = faultOf(*traffic, topics_) : "";
 }
 
 CameraFrame CameraInput::latest() const
@@ -129,10 +175,9 @@ CameraFrame CameraInput::latest() const
   const std::lock_guard<std::mutex> lock(mutex_);
   if (!latest_.image)
   {
-    throw ImageError("no image from the camera: " + (problem_.empty() ? "none came on " + topics().both() : problem_));
+    throw ImageError("no image from the camera: " + (problem_.empty() ? "none came on " + topics_.both() : problem_));
   }
-  const std::string fault =
-      faultOfAge(latest_.image->header.stamp, image_subscriber_.getTopic(), params_.max_image_age);
+  const std::string fault = faultOfAge(latest_.image->header.stamp, topics_.image, params_.max_image_age);
   if (!fault.empty())
   {
     // What has come since then could not be used.
@@ -154,10 +199,23 @@ std::string CameraInput::missing(CameraFrame& frame, const CameraFrame& before) 
   }
 }
 
-CameraFrame CameraInput::latest(double patience) const
+CameraFrame CameraInput::latest(double patience)
 {
+  {
+    const std::lock_guard<std::mutex> lock(connection_mutex_);
+    ++waiting_;
+    if (!connected_)
+    {
+      connect();
+    }
+  }
   CameraFrame frame;
   const std::string lacking = waitUntilReady(patience, [&] { return missing(frame); });
+  {
+    const std::lock_guard<std::mutex> lock(connection_mutex_);
+    --waiting_;
+    asked_ = std::chrono::steady_clock::now();
+  }
   if (!lacking.empty())
   {
     throw ImageError(lacking);
@@ -167,6 +225,10 @@ CameraFrame CameraInput::latest(double patience) const
 
 void CameraInput::diagnose(diagnostic_updater::DiagnosticStatusWrapper& status)
 {
+  const bool connected = [this] {
+    const std::lock_guard<std::mutex> lock(connection_mutex_);
+    return connected_;
+  }();
   const std::lock_guard<std::mutex> lock(mutex_);
   const auto now = std::chrono::steady_clock::now();
   const double period = std::chrono::duration<double>(now - last_diagnosis_).count();
@@ -178,6 +240,10 @@ void CameraInput::diagnose(diagnostic_updater::DiagnosticStatusWrapper& status)
   {
     status.summary(diagnostic_msgs::DiagnosticStatus::ERROR, problem_);
   }
+  else if (!connected)
+  {
+    status.summary(diagnostic_msgs::DiagnosticStatus::OK, "images are subscribed when somebody asks for one");
+  }
   else if (rate_ > 0.0)
   {
     status.summary(diagnostic_msgs::DiagnosticStatus::OK, "images arrive");
@@ -186,8 +252,8 @@ void CameraInput::diagnose(diagnostic_updater::DiagnosticStatusWrapper& status)
   {
     status.summary(diagnostic_msgs::DiagnosticStatus::WARN, "no image in the last " + seconds(period));
   }
-  status.add("Image topic", image_subscriber_.getTopic());
-  status.add("Camera info topic", info_subscriber_.getTopic());
+  status.add("Image topic", topics_.image);
+  status.add("Camera info topic", topics_.info);
   status.add("Rate [Hz]", rate_);
 }
 
@@ -210,7 +276,7 @@ void CameraInput::onPair(const CameraImageConstPtr& image, const sensor_msgs::Ca
     reportProblem(image->fault + "; it is left out");
     return;
   }
-  const std::string fault = faultOf(*image, *info, topics());
+  const std::string fault = faultOf(*image, *info, topics_);
   {
     const std::lock_guard<std::mutex> lock(mutex_);
     ++pairs_;
@@ -240,7 +306,7 @@ void CameraInput::checkInputs()
     const std::lock_guard<std::mutex> lock(mutex_);
     // Images alone are told of by onImage(), as a calibration may come after its image.
     const CameraTraffic traffic{ images_, infos_, pairs_, CHECK_PERIOD, pairing_.imagesAhead() };
-    problem = infos_ > 0 ? faultOf(traffic, topics()) : "";
+    problem = infos_ > 0 ? faultOf(traffic, topics_) : "";
     const bool silent = images_ + infos_ + pairs_ == 0;
     problem_ = !problem.empty() ? problem : silent && latest_.image ? "" : problem_;
     images_ = infos_ = pairs_ = 0;
@@ -259,11 +325,6 @@ void CameraInput::reportProblem(const std::string& problem) const
   {
     on_problem_(problem);
   }
-}
-
-CameraTopics CameraInput::topics() const
-{
-  return { image_subscriber_.getTopic(), info_subscriber_.getTopic() };
 }
 
 }  // namespace view_servo

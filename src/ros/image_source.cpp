@@ -88,7 +88,7 @@ std::vector<Parameter> parameters(ImageSourceParams& params)
   };
 }
 
-ImageSourceReader::ImageSourceReader(const ImageSourceParams& params, const CameraInput& camera)
+ImageSourceReader::ImageSourceReader(const ImageSourceParams& params, CameraInput& camera)
   : allow_paths_(params.allow_paths),
     image_patience_(params.image_patience),
     store_(viewsDir(params.views_dir)),

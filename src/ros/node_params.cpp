@@ -12,6 +12,8 @@ std::vector<Parameter> parameters(ViewStoreNodeParams& params)
       {
           text("fixed_frame", params.fixed_frame,
                "frame in which the camera's pose is stored with a view, where tf knows it; empty: never"),
+          real("idle_timeout", params.idle_timeout, "s", ">= 1",
+               "the camera's topics are let go of when nothing has been asked of the camera for so long"),
       },
       parameters(params.sources),
       parameters(params.camera),

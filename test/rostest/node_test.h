@@ -257,6 +257,11 @@ public:
         [&] { return image_publisher_.getNumSubscribers() >= count && info_publisher_.getNumSubscribers() >= count; });
   }
 
+  bool hasSubscribers() const
+  {
+    return image_publisher_.getNumSubscribers() > 0 || info_publisher_.getNumSubscribers() > 0;
+  }
+
   void publish(const cv::Mat& image, const ros::Time& stamp) const
   {
     const sensor_msgs::CameraInfo info = infoOf(image, stamp);

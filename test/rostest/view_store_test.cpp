@@ -18,8 +18,10 @@
 #include <opencv2/imgcodecs.hpp>
 
 #include <algorithm>
+#include <chrono>
 #include <cmath>
 #include <filesystem>
+#include <future>
 #include <string>
 #include <vector>
 
@@ -279,6 +281,29 @@ TEST_F(ViewStoreNodeTest, RefusesBadRequestsAndGoesOn)
   EXPECT_FALSE(get("never").success);
   EXPECT_NE(get("never").message.find("never"), std::string::npos);
   EXPECT_TRUE(call<SaveView>("save", imageRequest("fine")).success);
+}
+
+/** Images cost time on their way, whether somebody wants them or not. */
+TEST(IdleViewStoreTest, LetsGoOfItsCameraUntilItIsAskedForAnImage)
+{
+  const FakeCamera camera("idle_camera");
+  ASSERT_TRUE(waitForService("idle_store/save"));
+  const cv::Mat picture = texturedPicture(1);
+  for (const char* name : { "first", "second" })
+  {
+    ASSERT_TRUE(waitUntil([&] { return !camera.hasSubscribers(); })) << name;
+    SaveView::Request request;
+    request.name = name;
+    std::future<SaveView::Response> answer =
+        std::async(std::launch::async, [&] { return answerOf<SaveView>("idle_store/save", request); });
+    EXPECT_TRUE(waitUntil([&] {
+      camera.publish(picture, ros::Time::now());
+      return answer.wait_for(std::chrono::seconds(0)) == std::future_status::ready;
+    }));
+    const SaveView::Response saved = answer.get();
+    EXPECT_TRUE(saved.success) << saved.message;
+  }
+  removeViews("idle_store");
 }
 
 TEST_F(ViewStoreNodeTest, RefusesToStoreAnUncalibratedCamera)

@@ -63,6 +63,9 @@ public:
   void subscribe(const ros::NodeHandle& nh, const ros::NodeHandle& private_nh, const std::string& topic,
                  const std::string& transport, int queue_size);
 
+  /** Nothing is called any more, until it subscribes again. */
+  void shutdown();
+
   /** Resolved name of the topic that images come on. */
   const std::string& getTopic() const
   {

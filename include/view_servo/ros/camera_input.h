@@ -15,6 +15,7 @@
 
 #include <chrono>
 #include <functional>
+#include <limits>
 #include <memory>
 #include <mutex>
 #include <optional>
@@ -78,16 +79,22 @@ public:
   std::string problem() const;
 
   /**
+   * For a node that seldom needs an image: the topics are unsubscribed `idle` [s] after the last call of latest(double)
+   * or this, and subscribed again by the next call of latest(double).
+   */
+  void connectWhenAsked(double idle);
+
+  /**
    * Waits for latest(), as a camera may start later than its node. The wait is by a steady clock, and logged. Not to be
    * called by the threads that deliver images.
    * @param patience longest wait [s]. @throws ImageError when there is still no usable frame after that time.
    */
-  CameraFrame latest(double patience) const;
+  CameraFrame latest(double patience);
 
   /** Resolved name of the topic that images come on. */
   std::string imageTopic() const
   {
-    return image_subscriber_.getTopic();
+    return topics_.image;
   }
 
   /** Fills in a part of `/diagnostics`: whether usable frames come, at which rate, and problem(). */
@@ -108,11 +115,23 @@ private:
   void reportProblem(const std::string& problem) const;
   void onPair(const CameraImageConstPtr& image, const sensor_msgs::CameraInfoConstPtr& info);
   void checkInputs();
-  CameraTopics topics() const;
+  /** Subscribes both topics. connection_mutex_ is held. */
+  void connect();
+  /** Unsubscribes both, and forgets what came, when nobody has asked for long. */
+  void letGo();
 
-  CameraInputParams params_;
+  const ros::NodeHandle nh_;
+  const ros::NodeHandle private_nh_;
+  const CameraInputParams params_;
   Callback on_frame_;
   std::function<void(const std::string&)> on_problem_;
+
+  mutable std::mutex connection_mutex_;  // guards what follows, up to the next mutex; taken before the others
+  double idle_ = std::numeric_limits<double>::infinity();  // see connectWhenAsked()
+  bool connected_ = false;
+  int waiting_ = 0;                              // callers that wait for an image
+  std::chrono::steady_clock::time_point asked_;  // last
+
   mutable std::mutex mutex_;  // guards what follows, up to the other mutex
   CameraFrame latest_;
   std::string fault_;    // of the last pair
@@ -131,7 +150,9 @@ private:
 
   CameraImageSubscriber image_subscriber_;
   message_filters::Subscriber<sensor_msgs::CameraInfo> info_subscriber_;
+  CameraTopics topics_;  // as resolved at first
   ros::SteadyTimer check_timer_;
+  ros::SteadyTimer idle_timer_;
 };
 
 }  // namespace view_servo

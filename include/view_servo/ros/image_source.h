@@ -75,7 +75,7 @@ class ImageSourceReader
 {
 public:
   /** `camera` must outlive the reader. */
-  ImageSourceReader(const ImageSourceParams& params, const CameraInput& camera);
+  ImageSourceReader(const ImageSourceParams& params, CameraInput& camera);
 
   /**
    * Reads the image that a source names. CAMERA: blocks for up to image_patience until there is a usable image, as
@@ -94,7 +94,7 @@ private:
   bool allow_paths_;
   double image_patience_;
   ViewStore store_;
-  const CameraInput& camera_;
+  CameraInput& camera_;
 };
 
 }  // namespace view_servo

@@ -22,6 +22,7 @@ struct ViewStoreNodeParams
   CameraInputParams camera;
   ImageSourceParams sources;
   std::string fixed_frame = "odom";  ///< frame in which the camera's pose is stored with a view; empty: never
+  double idle_timeout = 60.0;        ///< see CameraInput::connectWhenAsked() [s]
 
   /** Each fault in one line, those of nested parameters included; empty when the parameters are usable. */
   std::vector<std::string> validate() const;
