@@ -11,6 +11,7 @@
 #include "experiments/arm_experiments.h"
 #include "experiments/arm_geometry_experiment.h"
 #include "experiments/cyclic_order_experiment.h"
+#include "experiments/docking_experiment.h"
 #include "experiments/experiment_context.h"
 #include "experiments/false_answers_experiment.h"
 #include "experiments/hand_eye_experiments.h"
@@ -75,6 +76,8 @@ const std::vector<Experiment>& experiments()
       runHomingDifferentialExperiment },
     { "homing_structure", "homing with what was learnt of the view in an earlier run, and without", false,
       STRUCTURE_STARTS, runStructureExperiment },
+    { "docking", "laws for a base that cannot slide, beside Park and Kuipers', without pictures", false,
+      DOCKING_STARTS, runDockingExperiment },
     { "routes", "routes through simulated rooms, recorded and followed", false, ROUTES, runRoutesExperiment },
     { "arm", "table 8.1: servoing of a simulated arm, from many starts", false, ARM_RUNS, runArmExperiment },
     { "arm_scene", "the same with views of scenes that have depth", false, ARM_RUNS, runArmSceneExperiment },

@@ -61,7 +61,7 @@ TEST(Experiments, RefusesRunsWhereNothingIsRepeated)
     expectContains(outcome.err, "--runs: " + name + " repeats nothing");
     expectContains(
         outcome.err,
-        "homing, homing_differential, homing_structure, routes, arm, arm_scene, multi_hypothesis, real_pairs, "
+        "homing, homing_differential, homing_structure, docking, routes, arm, arm_scene, multi_hypothesis, real_pairs, "
         "profiles_parameters, "
         "view_consistency, rooms, false_answers, recognition, hand_eye, mount, cyclic_order, campaign do");
   }

@@ -1,9 +1,13 @@
 #!/usr/bin/python3
 # Copyright (c) 2026, the view_servo authors
 # SPDX-License-Identifier: BSD-3-Clause
-"""replay.launch with the package's sample: it ends by itself, with headings that are right and a page that shows the view."""
+"""
+replay.launch with the package's sample: it ends by itself, with headings that are right and a page that shows the view. And
+route.launch with a recorded drive, along which it follows the route.
+"""
 import math
 import os
+import signal
 import sys
 import unittest
 
@@ -12,7 +16,9 @@ sys.path.insert(0, os.path.join(ROOT, "test", "docs"))
 import graph  # noqa: E402
 
 import rosbag  # noqa: E402
-from view_servo.msg import Heading  # noqa: E402
+import rospy  # noqa: E402
+from geometry_msgs.msg import Twist  # noqa: E402
+from view_servo.msg import FollowRouteActionFeedback, FollowRouteActionResult, Heading  # noqa: E402
 
 PATIENCE = 120.0 * graph.SLOWDOWN  # the bag takes 12 s
 LARGEST_BAG = 1.5e6                # so that every installation can have it [bytes]
@@ -57,6 +63,32 @@ class Replay(graph.GraphTest):
         self.assertGreater(right, 0.9 * told, "of %d headings" % told)
         self.assertIn(Heading.ARRIVED, {heading.state for heading in headings})
 
+    def test_a_drive_along_a_route(self):
+        bag = os.path.join(self.directory, "drive.bag")
+        recording = self.graph.start("roslaunch", "--wait", "view_servo", "record.launch", "bag:=" + bag, "compression:=none")
+        status, text = self.graph.run("roslaunch --wait view_servo route.launch result:=" + bag + ".result", 2.0 * PATIENCE)
+        self.assertEqual(status, 0, text)
+        graph.outcome_of_run(bag + ".result")
+        recording.send_signal(signal.SIGINT)
+        recording.wait(PATIENCE)
+
+        commands, passed, results = [], [], []
+        for topic, kind, take in (("cmd_vel", Twist, commands.append),
+                                  ("follow/feedback", FollowRouteActionFeedback, passed.append),
+                                  ("follow/result", FollowRouteActionResult, results.append)):
+            self.addCleanup(rospy.Subscriber(topic, kind, take, queue_size=1000).unregister)
+        status, text = self.graph.run("roslaunch --wait view_servo route.launch bag:=%s route:=demo play_options:=--rate=0.6" % bag,
+                                      2.0 * PATIENCE)
+        self.assertEqual(status, 0, text)
+        self.assertEqual(commands, [], "a dry run commands nothing")
+        if graph.SLOWDOWN > 1.0:
+            return  # too slow for images that come in real time
+        self.assertTrue(results and results[0].result.success, text)
+        views = list(dict.fromkeys(message.feedback.view for message in passed))
+        self.assertGreater(len(views), 3)
+        self.assertEqual(views, sorted(views), "one after the other")
+        self.assertIn("arrived", text)
+
 
 if __name__ == "__main__":
-    unittest.main()
+    unittest.main(warnings="ignore")  # ROS leaves sockets to the end
