@@ -34,7 +34,8 @@ _view_servo_view()
     show) options+=" --out" ;;
     go) options+=" --timeout --enable --driver --approach" ;;
     follow) options+=" --timeout --enable --from --to --reverse" ;;
-    record | delete | stop | watch) ;;
+    stop) options+=" --all" ;;
+    record | delete | watch) ;;
     *) return ;;
   esac
   # Bash takes a:=b apart into three words.

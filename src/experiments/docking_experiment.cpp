@@ -33,11 +33,7 @@ namespace view_servo
 {
 namespace
 {
-constexpr double IMAGE_PERIOD = 0.1;       // [s]
-constexpr double TOLERANCE = 0.01;         // distance from the goal at which a base counts as there [m]
-constexpr double LONGEST = 120.0;          // of a run [s]
-constexpr double NEAR_ENOUGH = 0.02;       // of the goal, at the end [m]
-constexpr double STRAIGHT = M_PI / 180.0;  // likewise [rad]
+constexpr double DOCKED = 0.01;  // distance from the goal at which a base counts as there [m]
 
 /** What a tracker of the view knows, without its pictures. */
 class Sight
@@ -142,7 +138,7 @@ public:
   TurnAndDrive()
   {
     params_.base = BaseKind::DIFFERENTIAL;
-    law_ = makeApproachLaw(params_, TOLERANCE);
+    law_ = makeApproachLaw(params_, DOCKED);
   }
 
   BaseVelocity next(const Told& told) override
@@ -206,7 +202,7 @@ public:
       begin(told);
     }
     const PlanarPose left = compose(inverse(told.base), told.goal);
-    if (told.seen && left.distance() <= TOLERANCE)
+    if (told.seen && left.distance() <= DOCKED)
     {
       arrived_ = true;
       return BaseVelocity::Zero();
@@ -285,6 +281,8 @@ struct DockingOutcome
 
   bool isThere() const
   {
+    constexpr double NEAR_ENOUGH = 0.02;       // [m]
+    constexpr double STRAIGHT = M_PI / 180.0;  // [rad]
     return error.distance() <= NEAR_ENOUGH && std::abs(error.yaw) <= STRAIGHT;
   }
 };
@@ -319,7 +317,9 @@ sim::NomadParams baseOf(const DockingRun& run)
 
 DockingOutcome dock(const sim::World& world, const DockingRun& run)
 {
-  constexpr double NEW_PART = 0.5;  // of a measurement in what is believed
+  constexpr double IMAGE_PERIOD = 0.1;  // [s]
+  constexpr double LONGEST = 120.0;     // of a run [s]
+  constexpr double NEW_PART = 0.5;      // of a measurement in what is believed
   sim::Nomad nomad(world, baseOf(run));
   nomad.setPose(sim::planarPose(run.start.x, run.start.y, run.start.yaw));
   Sight sight(world, run.seed);

@@ -21,6 +21,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <exception>
+#include <filesystem>
 #include <iostream>
 #include <string>
 #include <thread>
@@ -83,8 +84,7 @@ CalibrationStatus finish(const Calibration& calibration, const HandEyePosesFile&
   writeHandEyeFile(file, out);
   std::cout << "written to " << out << "; to publish it, one of\n"
             << "  roslaunch view_servo " << Calibration::LAUNCH_ARGUMENTS << out << '\n'
-            << "  rosrun tf2_ros static_transform_publisher " << numbers << ' ' << file.flange_frame << ' '
-            << file.camera_frame << std::endl;
+            << "  rosrun view_servo publish_hand_eye _file:=" << std::filesystem::absolute(out).string() << std::endl;
   return CALIBRATED;
 }
 

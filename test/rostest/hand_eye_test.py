@@ -132,7 +132,8 @@ class HandEye(graph.GraphTest):
         sigma = numpy.sqrt(numpy.diag(numpy.array(found["covariance"]).reshape(6, 6)))
         self.assertTrue((sigma > 1e-6).all() and (sigma[:3] < 1e-3).all() and (sigma[3:] < 2e-3).all(), sigma)
         self.assertIn("hand_eye:=mounted.yaml", text)
-        self.assertIn("static_transform_publisher %.6f" % place[0], text)
+        self.assertIn("x y z qx qy qz qw = %.6f" % place[0], text)
+        self.assertIn("rosrun view_servo publish_hand_eye _file:=/", text)
 
         self.check_offline(numbers, place, rotation)
 

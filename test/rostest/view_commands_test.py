@@ -222,7 +222,7 @@ class ViewCommands(graph.GraphTest):
                 ("list --patience 0.3", "/hanging", "/hanging/view_store/list does not answer within 0.3 s"),
                 ("list", "/dead", "/dead/view_store/list cannot be called"),
                 ("go x", "/empty", "nobody serves the actions /empty/home, /empty/servo and /empty/follow; there is one in /.* and in /base: set"),
-                ("stop", "/empty", "no driver runs"),
+                ("stop", "/empty", "no driver runs: .* or add __ns:=.*, or --all"),
                 ("list", "/empty", "there is no /empty/view_store/list; there is one in /")):
             self.view_here(command, CANNOT, complaint, ROS_NAMESPACE=space)
         self.end(watch, CANNOT, "no driver runs")
@@ -378,6 +378,7 @@ class ViewCommands(graph.GraphTest):
             self.assertTrue(driver.came.wait(PATIENCE))
         out = self.view("stop servo:=arm1/servo")
         self.assertEqual(out.count("disabled; no goal is left"), 3, out)
+        self.assertIn("left alone: /base/homing and /dead/peer and /hanging/peer; --all stops those, too", out)
         self.assertEqual((self.homing.enabled, self.arm.enabled, self.follower.enabled), (False, False, False))
         for process in runs:
             self.end(process, NOT_DONE, "not arrived: the goal was cancelled")
@@ -393,6 +394,14 @@ class ViewCommands(graph.GraphTest):
         self.assertEqual(process.returncode, NOT_DONE, out + err)
         self.assertIn("no goal is left", out)
         self.assertIn("not stopped", err)
+        # All that can be reached are stopped, wherever they are.
+        self.homing.enabled = self.arm.enabled = self.follower.enabled = True
+        process = self.begin("stop", "--all", "--patience", "0.5", "__ns:=/empty")
+        out, err = process.communicate(timeout=PATIENCE)
+        self.assertEqual(process.returncode, NOT_DONE, out + err)
+        self.assertEqual((self.homing.enabled, self.arm.enabled, self.follower.enabled), (False, False, False))
+        self.assertIn("/base/homing: disabled; no goal is left", out)
+        self.assertRegex(err, "not stopped: /dead/peer and /hanging/peer; use the robot's emergency stop")
         # A driver whose gate nobody finds may drive again.
         self.arm.service.shutdown()
         process = self.begin("stop", "servo:=arm1/servo")
