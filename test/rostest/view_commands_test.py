@@ -396,11 +396,11 @@ class ViewCommands(graph.GraphTest):
         self.assertIn("not stopped", err)
         # All that can be reached are stopped, wherever they are.
         self.homing.enabled = self.arm.enabled = self.follower.enabled = True
-        process = self.begin("stop", "--all", "--patience", "0.5", "__ns:=/empty")
+        process = self.begin("stop", "--all", "--patience", "%g" % (3.0 * graph.SLOWDOWN), "__ns:=/empty")
         out, err = process.communicate(timeout=PATIENCE)
         self.assertEqual(process.returncode, NOT_DONE, out + err)
         self.assertEqual((self.homing.enabled, self.arm.enabled, self.follower.enabled), (False, False, False))
-        self.assertIn("/base/homing: disabled; no goal is left", out)
+        self.assertIn("/base/homing: disabled; no goal is left", out, err)
         self.assertRegex(err, "not stopped: /dead/peer and /hanging/peer; use the robot's emergency stop")
         # A driver whose gate nobody finds may drive again.
         self.arm.service.shutdown()
