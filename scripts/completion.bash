@@ -32,8 +32,8 @@ _view_servo_view()
     list) options+=" --json --names" ;;
     save) options+=" --overwrite --learn --roi --file" ;;
     show) options+=" --out" ;;
-    go) options+=" --timeout --enable --driver --approach" ;;
-    follow) options+=" --timeout --enable --from --to --reverse" ;;
+    go) options+=" --timeout --enable --wait --driver --approach" ;;
+    follow) options+=" --timeout --enable --wait --from --to --reverse" ;;
     stop) options+=" --all" ;;
     record | delete | watch) ;;
     *) return ;;
