@@ -67,9 +67,8 @@ CameraInput::CameraInput(const ros::NodeHandle& nh, const ros::NodeHandle& priva
     connect();
   }
   topics_ = { image_subscriber_.getTopic(), info_subscriber_.getTopic() };
-  ros::NodeHandle timers(nh);
-  check_timer_ = timers.createSteadyTimer(ros::WallDuration(CHECK_PERIOD),
-                                          [this](const ros::SteadyTimerEvent&) { checkInputs(); });
+  check_timer_ =
+      nh.createSteadyTimer(ros::WallDuration(CHECK_PERIOD), [this](const ros::SteadyTimerEvent&) { checkInputs(); });
 }
 
 void CameraInput::connect()
