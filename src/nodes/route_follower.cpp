@@ -441,11 +441,11 @@ private:
   std::optional<RouteGuide> guide_;   // while a goal runs
   std::shared_ptr<HomingTask> next_;  // to the view after this one, once it is read
   CameraFrame frame_;
-  std::vector<RouteStop> stops_;             // of the goal
-  std::string ordered_;                      // the view that is read, or was last
-  bool jumps_ = false;                       // the base drives to that one at once
+  std::vector<RouteStop> stops_;                 // of the goal
+  std::string ordered_;                          // the view that is read, or was last
+  bool jumps_ = false;                           // the base drives to that one at once
   std::optional<Clock::time_point> lost_since_;  // the view is not found
-  ros::Subscriber recognized_;               // homing's thread's alone
+  ros::Subscriber recognized_;                   // homing's thread's alone
   // Their threads use what is above, and homing's the worker, only while a goal runs; the worker may still use homing.
   ViewHoming homing_;
   Worker<Order> worker_;
