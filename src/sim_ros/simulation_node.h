@@ -18,8 +18,8 @@
 #include <ros/console.h>
 #include <ros/param.h>
 #include <ros/rate.h>
-#include <ros/subscriber.h>
 #include <ros/steady_timer.h>
+#include <ros/subscriber.h>
 #include <sensor_msgs/image_encodings.h>
 #include <opencv2/imgproc.hpp>
 
