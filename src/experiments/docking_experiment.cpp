@@ -245,7 +245,7 @@ private:
     backwards_ = compose(inverse(told.base), told.goal).x < 0.0;
   }
 
-  /** Equation 14 of the paper, with the speed of its equation 15, slower near the target. @param target in the base. */
+  /** The paper's curvature, and its speed, which falls with that; slower near the target. @param target in the base. */
   static BaseVelocity towards(const PlanarPose& target, bool backwards)
   {
     constexpr double K1 = 3.0;

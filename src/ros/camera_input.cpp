@@ -202,11 +202,11 @@ CameraFrame CameraInput::latest(double patience)
 {
   {
     const std::lock_guard<std::mutex> lock(connection_mutex_);
-    ++waiting_;
     if (!connected_)
     {
       connect();
     }
+    ++waiting_;
   }
   CameraFrame frame;
   const std::string lacking = waitUntilReady(patience, [&] { return missing(frame); });
