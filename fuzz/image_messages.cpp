@@ -20,11 +20,22 @@ namespace
 {
 constexpr std::uint64_t LARGEST = 1'000'000;  // to decode more takes so long that little else would be tried [px]
 
+void requireNoLarger(const cv::Mat& image, std::uint64_t width, std::uint64_t height)
+{
+  fuzz::require(static_cast<std::uint64_t>(image.cols) <= width && static_cast<std::uint64_t>(image.rows) <= height,
+                "an image is no larger than its message says");
+}
+
 void requireGrey(const cv::Mat& grey, std::uint64_t width, std::uint64_t height)
 {
   fuzz::require(grey.type() == CV_8UC1, "an image is grey");
-  fuzz::require(static_cast<std::uint64_t>(grey.cols) <= width && static_cast<std::uint64_t>(grey.rows) <= height,
-                "it is no larger than its message says");
+  requireNoLarger(grey, width, height);
+}
+
+void requireColour(const cv::Mat& colour, std::uint64_t width, std::uint64_t height)
+{
+  fuzz::require(colour.type() == CV_8UC3, "an image for people has colours");
+  requireNoLarger(colour, width, height);
 }
 
 void readRaw(const sensor_msgs::Image& message)
@@ -35,6 +46,7 @@ void readRaw(const sensor_msgs::Image& message)
   }
   const CameraImage image(boost::make_shared<sensor_msgs::Image>(message), "/image_raw");
   fuzz::readOrRefuse<ImageError>([&] { requireGrey(toGrey(image), message.width, message.height); });
+  fuzz::readOrRefuse<ImageError>([&] { requireColour(toColour(image), message.width, message.height); });
 }
 
 void readCompressed(const sensor_msgs::CompressedImage& message)
@@ -50,6 +62,7 @@ void readCompressed(const sensor_msgs::CompressedImage& message)
   if (pixels <= LARGEST)
   {
     fuzz::readOrRefuse<ImageError>([&] { requireGrey(toGrey(image), image.width, image.height); });
+    fuzz::readOrRefuse<ImageError>([&] { requireColour(toColour(image), image.width, image.height); });
   }
 }
 }  // namespace

@@ -8,7 +8,6 @@
 #include "view_servo/ros/conversions.h"
 #include "view_servo/ros/node_base.h"
 
-#include <cv_bridge/cv_bridge.h>
 #include <image_transport/image_transport.h>
 #include <image_transport/transport_hints.h>
 #include <sensor_msgs/image_encodings.h>
@@ -77,24 +76,20 @@ cv::Mat toGrey(const CameraImage& image)
 
 cv::Mat toColour(const CameraImage& image)
 {
-  namespace encodings = sensor_msgs::image_encodings;
-  cv::Mat colour;
-  if (image.packed)
+  if (!image.packed)
   {
-    cv::Mat decoded = decodeImage(std::string(image.packed->data.begin(), image.packed->data.end()), image.topic);
-    if (decoded.type() == CV_8UC3)
-    {
-      return decoded;
-    }
-    cv::cvtColor(toGrey(decoded, image.topic), colour, cv::COLOR_GRAY2BGR);
-    return colour;
+    return toColour(*image.raw, image.topic);
   }
-  if (encodings::isColor(image.raw->encoding) && encodings::bitDepth(image.raw->encoding) == 8)
+  cv::Mat decoded = decodeImage(std::string(image.packed->data.begin(), image.packed->data.end()), image.topic);
+  if (decoded.type() != CV_8UC3)
   {
-    return cv_bridge::toCvCopy(image.raw, encodings::BGR8)->image;
+    cv::cvtColor(toGrey(decoded, image.topic), decoded, cv::COLOR_GRAY2BGR);
   }
-  cv::cvtColor(toGrey(image), colour, cv::COLOR_GRAY2BGR);
-  return colour;
+  else if (decodedEncoding(image.packed->format, decoded.type()) == sensor_msgs::image_encodings::RGB8)
+  {
+    cv::cvtColor(decoded, decoded, cv::COLOR_RGB2BGR);
+  }
+  return decoded;
 }
 
 void CameraImageSubscriber::subscribe(const ros::NodeHandle& nh, const ros::NodeHandle& private_nh,

@@ -9,7 +9,9 @@
 
 #include <cv_bridge/cv_bridge.h>
 #include <sensor_msgs/image_encodings.h>
+#include <boost/endian/conversion.hpp>
 #include <boost/make_shared.hpp>
+#include <opencv2/imgproc.hpp>
 
 #include <algorithm>
 #include <array>
@@ -17,6 +19,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <limits>
+#include <utility>
 
 namespace view_servo
 {
@@ -45,10 +48,88 @@ bool needsReordering(const std::string& encoding)
          encoding == enc::RGBA16 || encoding == enc::YUV422;
 }
 
-/** Grey of an image that needs reordering. @throws cv_bridge::Exception, ImageError. */
+/** Grey of an image that needs reordering; all bits count. @throws cv_bridge::Exception, cv::Exception, ImageError. */
 cv::Mat reordered(const cv_bridge::CvImageConstPtr& image, const std::string& name)
 {
-  return toGrey(cv_bridge::cvtColor(image, sensor_msgs::image_encodings::BGR8)->image, name);
+  namespace enc = sensor_msgs::image_encodings;
+  const std::string& ordered = enc::bitDepth(image->encoding) == 16 ? enc::BGR16 : enc::BGR8;
+  return toGrey(cv_bridge::cvtColor(image, ordered)->image, name);
+}
+
+/** @throws ImageError when a message has too many pixels, or not the bytes that it says. */
+void requireWhole(const sensor_msgs::Image& image, const std::string& name)
+{
+  if (static_cast<std::uint64_t>(image.width) * image.height > static_cast<std::uint64_t>(MAX_IMAGE_PIXELS))
+  {
+    throw ImageError("'" + name + "': " + std::to_string(image.width) + " x " + std::to_string(image.height) +
+                     " pixels are too many, the limit is " + std::to_string(MAX_IMAGE_PIXELS));
+  }
+  // cv_bridge compares in 32 bits, where the product may wrap.
+  if (static_cast<std::uint64_t>(image.step) * image.height != image.data.size())
+  {
+    throw ImageError("'" + name + "': " + std::to_string(image.data.size()) + " bytes are not " +
+                     std::to_string(image.height) + " rows of " + std::to_string(image.step));
+  }
+}
+
+/** cv_bridge swaps the bytes of no image with padded rows, and changes the type of others. @throws cv_bridge's. */
+bool needsSwapping(const sensor_msgs::Image& image)
+{
+  constexpr bool HERE = boost::endian::order::native == boost::endian::order::big;
+  return (image.is_bigendian != 0) != HERE && sensor_msgs::image_encodings::bitDepth(image.encoding) == 16;
+}
+
+/** The same image in the order of bytes of this machine; of 16 bits. */
+sensor_msgs::Image swapped(const sensor_msgs::Image& image)
+{
+  sensor_msgs::Image result = image;
+  result.is_bigendian = image.is_bigendian != 0 ? 0 : 1;
+  for (std::size_t row = 0; row < image.height; ++row)
+  {
+    std::uint8_t* const data = result.data.data() + row * image.step;
+    for (std::size_t i = 0; i + 1 < image.step; i += 2)
+    {
+      std::swap(data[i], data[i + 1]);
+    }
+  }
+  return result;
+}
+
+/**
+ * Runs `body`, which uses an image. @throws ImageError; what OpenCV and cv_bridge throw is told as one.
+ * @param said what the image is said to be.
+ */
+template <typename Body>
+cv::Mat aboutImage(const std::string& name, const std::string& said, const Body& body)
+{
+  try
+  {
+    return body();
+  }
+  catch (const ImageError&)
+  {
+    throw;
+  }
+  catch (const std::exception& error)
+  {
+    throw ImageError("'" + name + "': " + said + ": " + oneLine(error));
+  }
+}
+
+/** Hands a whole message in this machine's order of bytes to `body`. @throws ImageError. */
+template <typename Body>
+cv::Mat withImage(const sensor_msgs::Image& image, const std::string& name, const Body& body)
+{
+  requireWhole(image, name);
+  return aboutImage(name, "encoding '" + shown(image.encoding) + "'", [&] {
+    const boost::shared_ptr<const void> outlives_this_call;
+    if (needsSwapping(image))
+    {
+      const sensor_msgs::Image ordered = swapped(image);
+      return body(cv_bridge::toCvShare(ordered, outlives_this_call));
+    }
+    return body(cv_bridge::toCvShare(image, outlives_this_call));
+  });
 }
 
 /** What `read`, given the data and its name, makes of a compressed image; errors say what it was said to be. */
@@ -129,27 +210,23 @@ sensor_msgs::CameraInfo toCameraInfo(const Camera& camera, const std_msgs::Heade
 
 cv::Mat toGrey(const sensor_msgs::Image& image, const std::string& name)
 {
-  if (static_cast<std::uint64_t>(image.width) * image.height > static_cast<std::uint64_t>(MAX_IMAGE_PIXELS))
-  {
-    throw ImageError("'" + name + "': " + std::to_string(image.width) + " x " + std::to_string(image.height) +
-                     " pixels are too many, the limit is " + std::to_string(MAX_IMAGE_PIXELS));
-  }
-  // cv_bridge compares in 32 bits, where the product may wrap.
-  if (static_cast<std::uint64_t>(image.step) * image.height != image.data.size())
-  {
-    throw ImageError("'" + name + "': " + std::to_string(image.data.size()) + " bytes are not " +
-                     std::to_string(image.height) + " rows of " + std::to_string(image.step));
-  }
-  try
-  {
-    const boost::shared_ptr<const void> outlives_this_call;
-    const cv_bridge::CvImageConstPtr shared = cv_bridge::toCvShare(image, outlives_this_call);
+  return withImage(image, name, [&](const cv_bridge::CvImageConstPtr& shared) {
     return needsReordering(image.encoding) ? reordered(shared, name) : toGrey(shared->image, name).clone();
-  }
-  catch (const cv_bridge::Exception& error)
+  });
+}
+
+cv::Mat toColour(const sensor_msgs::Image& image, const std::string& name)
+{
+  namespace enc = sensor_msgs::image_encodings;
+  if (enc::isColor(image.encoding) && enc::bitDepth(image.encoding) == 8)
   {
-    throw ImageError("'" + name + "': encoding '" + shown(image.encoding) + "': " + oneLine(error));
+    return withImage(image, name, [](const cv_bridge::CvImageConstPtr& shared) {
+      return cv_bridge::cvtColor(shared, enc::BGR8)->image.clone();
+    });
   }
+  cv::Mat colour;
+  cv::cvtColor(toGrey(image, name), colour, cv::COLOR_GRAY2BGR);
+  return colour;
 }
 
 cv::Size sizeOf(const sensor_msgs::CompressedImage& image, const std::string& name)
@@ -165,14 +242,9 @@ cv::Mat toGrey(const sensor_msgs::CompressedImage& image, const std::string& nam
   {
     return toGrey(decoded, name);
   }
-  try
-  {
+  return aboutImage(name, "format '" + shown(image.format) + "'", [&] {
     return reordered(boost::make_shared<const cv_bridge::CvImage>(image.header, encoding, decoded), name);
-  }
-  catch (const cv_bridge::Exception& error)
-  {
-    throw ImageError("'" + name + "': format '" + shown(image.format) + "': " + oneLine(error));
-  }
+  });
 }
 
 std::string decodedEncoding(const std::string& format, int type)

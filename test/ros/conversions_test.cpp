@@ -159,6 +159,71 @@ TEST(ImageConversion, TurnsEveryEncodingIntoTheSameGrey)
   }
 }
 
+TEST(ImageConversion, TellsAllLevelsOfAFewBitsOfSixteen)
+{
+  cv::Mat ramp(40, 256, CV_16UC1);  // of 10 bits
+  for (int u = 0; u < ramp.cols; ++u)
+  {
+    ramp.col(u).setTo(4 * u);
+  }
+  cv::Mat colour;
+  cv::merge(std::vector<cv::Mat>(3, ramp), colour);
+  cv::Mat colours_and_alpha;
+  cv::cvtColor(colour, colours_and_alpha, cv::COLOR_BGR2BGRA);
+  const cv::Mat grey = toGrey(toImage(ramp, enc::MONO16, {}), "grey");
+  for (const auto& [encoding, image] : std::vector<std::pair<std::string, cv::Mat>>{ { enc::RGB16, colour },
+                                                                                     { enc::BGR16, colour },
+                                                                                     { enc::RGBA16, colours_and_alpha },
+                                                                                     { enc::BAYER_RGGB16, ramp } })
+  {
+    const cv::Mat converted = toGrey(toImage(image, encoding, {}), encoding);
+    const cv::Rect inside(2, 2, ramp.cols - 4, ramp.rows - 4);
+    EXPECT_LE(test::largestDifference(converted(inside), grey(inside)), 3.0) << encoding;
+  }
+}
+
+TEST(ImageConversion, ReadsEitherOrderOfBytes)
+{
+  for (const int type : { CV_16UC1, CV_16UC3 })
+  {
+    cv::Mat wide(20, 21, type);
+    cv::randu(wide, cv::Scalar::all(0), cv::Scalar::all(65536));
+    const std::string encoding = type == CV_16UC1 ? enc::MONO16 : enc::RGB16;
+    const sensor_msgs::Image little = toImage(wide, encoding, {});
+    ASSERT_EQ(little.is_bigendian, 0);
+    sensor_msgs::Image big = little;  // with rows that are padded, too
+    big.is_bigendian = 1;
+    big.step += 6;
+    big.data.assign(std::size_t{ big.step } * big.height, 7);
+    for (std::size_t row = 0; row < big.height; ++row)
+    {
+      for (std::size_t i = 0; i < little.step; ++i)
+      {
+        big.data[row * big.step + (i ^ 1U)] = little.data[row * little.step + i];
+      }
+    }
+    EXPECT_EQ(test::largestDifference(toGrey(big, "big"), toGrey(little, "little")), 0.0) << encoding;
+  }
+}
+
+TEST(ImageConversion, ShowsColoursToPeople)
+{
+  const cv::Mat bgr = examplePicture();
+  cv::Mat rgb;
+  cv::cvtColor(bgr, rgb, cv::COLOR_BGR2RGB);
+  EXPECT_EQ(cv::norm(toColour(toImage(rgb, enc::RGB8, {}), "colours"), bgr, cv::NORM_INF), 0.0);
+  cv::Mat grey;
+  cv::cvtColor(bgr, grey, cv::COLOR_BGR2GRAY);
+  const cv::Mat shown = toColour(toImage(grey, enc::MONO8, {}), "grey");
+  EXPECT_EQ(shown.type(), CV_8UC3);
+  sensor_msgs::Image wraps = toImage(bgr, enc::BGR8, {});
+  wraps.width = 1;
+  wraps.height = 2;
+  wraps.step = (1U << 31) + 3;  // whose product wraps to 6 in 32 bits
+  wraps.data.resize(6);
+  EXPECT_NE(test::thrownMessage<ImageError>([&] { toColour(wraps, "wraps"); }).find("6 bytes"), std::string::npos);
+}
+
 TEST(ImageConversion, DemosaicsBayerPatterns)
 {
   const cv::Mat bgr = examplePicture();

@@ -43,7 +43,7 @@ using CameraImageConstPtr = boost::shared_ptr<const CameraImage>;
  */
 cv::Mat toGrey(const CameraImage& image);
 
-/** As 8-bit BGR, for people. @throws ImageError or cv_bridge::Exception. */
+/** As 8-bit BGR, for people. @throws ImageError as toGrey() does. */
 cv::Mat toColour(const CameraImage& image);
 
 /**

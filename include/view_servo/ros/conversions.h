@@ -59,6 +59,12 @@ sensor_msgs::CameraInfo toCameraInfo(const Camera& camera, const std_msgs::Heade
  * @throws ImageError when the encoding or the size cannot be used, or the data does not fit the size.
  */
 cv::Mat toGrey(const sensor_msgs::Image& image, const std::string& name);
+
+/**
+ * As 8-bit BGR, for people; images of 16 bits and mosaics are shown as grey. @param name as above. @throws ImageError as
+ * toGrey() does.
+ */
+cv::Mat toColour(const sensor_msgs::Image& image, const std::string& name);
 /**
  * A JPEG or PNG image, or another format of decodeImage(), as 8-bit grey.
  * @param name as above. @throws ImageError, with format and number of bytes, when it is damaged, is not such an image,
