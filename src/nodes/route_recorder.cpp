@@ -23,6 +23,7 @@
 #include <nav_msgs/Odometry.h>
 #include <std_srvs/Trigger.h>
 
+#include <algorithm>
 #include <cmath>
 #include <cstdio>
 #include <functional>
@@ -87,6 +88,14 @@ private:
   {
     CameraFrame frame;
     PlanarPose base;  ///< in odometry's frame
+  };
+
+  /** A view that can be stored. */
+  struct NewView
+  {
+    StoredView stored;
+    CameraMount mount;                      // where the camera is on the base
+    std::unique_ptr<RouteSpacing> spacing;  // from this view on
   };
 
   struct Recording
@@ -162,14 +171,15 @@ private:
   // ----------------------------------------------------------------------------------------------------- recording
 
   /**
-   * @throws std::runtime_error when there is a view of a name that the route's views may get, as the recording would end
-   * at it.
+   * @param replaced views that are removed before there are others. @throws std::runtime_error when there is another
+   * view of a name that the route's views may get, as the recording would end at it.
    */
-  void requireFreeNames(const std::string& name) const
+  void requireFreeNames(const std::string& name, const std::vector<std::string>& replaced) const
   {
     for (const std::string& view : routes_.views().names())
     {
-      if (view.compare(0, name.size() + 1, name + "_") == 0 &&
+      if (std::find(replaced.begin(), replaced.end(), view) == replaced.end() &&
+          view.compare(0, name.size() + 1, name + "_") == 0 &&
           view.find_first_not_of("0123456789", name.size() + 1) == std::string::npos)
       {
         throw std::runtime_error("there is a view '" + view + "' already: take another name, or delete it if " +
@@ -202,17 +212,15 @@ private:
     recording.route.name = name;
     try
     {
-      if (!replaces)
-      {
-        requireFreeNames(name);
-      }
+      // All that may be refused comes before the route goes that is replaced.
+      requireFreeNames(name, replaces ? routes_.ownViews(name) : std::vector<std::string>());
       const Place place = waitForPlace();
+      NewView view = prepare(place, viewNameOf(name, 1));
       if (replaces)
       {
         const std::string warning = routes_.remove(name);
         ROS_INFO_STREAM("deleted route '" << name << "', which is replaced" << (warning.empty() ? "" : "; ")
                                           << warning);
-        requireFreeNames(name);
       }
       {
         const std::lock_guard<std::mutex> input_lock(input_mutex_);
@@ -220,7 +228,7 @@ private:
         recording.route.frame = odometry_.frame();
       }
       recording_ = std::move(recording);
-      add(place);
+      add(std::move(view), place.base);
     }
     catch (const std::exception& error)
     {
@@ -329,7 +337,7 @@ private:
     }
   }
 
-  /** As add(), if the base has not gone too far since the last view. */
+  /** Adds a view there, if the base has not gone too far since the last view, and the route may grow. */
   void addChecked(const Place& place)
   {
     constexpr double MOST = 2.0;  // times the usual distance and turn
@@ -343,42 +351,49 @@ private:
                     moved.distance(), std::abs(moved.yaw) * 180.0 / M_PI);
       throw std::runtime_error(text + last.view + "': drive slower");
     }
-    add(place);
-  }
-
-  /** Stores a view, and adds it to the route. @throws std::runtime_error saying why it cannot be. */
-  void add(const Place& place)
-  {
-    Route& route = recording_->route;
-    if (route.stops.size() >= MAX_ROUTE_STOPS)
+    if (recording_->route.stops.size() >= MAX_ROUTE_STOPS)
     {
       throw std::runtime_error("it has " + std::to_string(MAX_ROUTE_STOPS) + " views already");
     }
+    add(prepare(place, viewNameOf(recording_->route.name, recording_->route.stops.size() + 1)), place.base);
+  }
+
+  /** All that a view needs before it is stored. @throws std::exception saying what of it cannot be. */
+  NewView prepare(const Place& place, const std::string& name) const
+  {
     const std_msgs::Header& header = place.frame.image->header;
     const geometry_msgs::TransformStamped mount =
         transforms_.lookUp(base_frame_, header.frame_id, ros::Time(0), params_.patience);
-    StoredView view;
-    view.name = viewNameOf(route.name, route.stops.size() + 1);
-    view.image = toGrey(*place.frame.image);
-    view.camera = toCamera(*place.frame.info);
-    view.stamp = header.stamp.toSec();
-    view.frame_id = header.frame_id;
-    recording_->mount = CameraMount(toIsometry(mount.transform));
-    auto spacing = std::make_unique<RouteSpacing>(params_.spacing, view.image, *view.camera, recording_->mount);
-    if (const std::string warning = routes_.views().save(view, false); !warning.empty())
+    NewView view;
+    view.stored.name = name;
+    view.stored.image = toGrey(*place.frame.image);
+    view.stored.camera = toCamera(*place.frame.info);
+    view.stored.stamp = header.stamp.toSec();
+    view.stored.frame_id = header.frame_id;
+    view.mount = CameraMount(toIsometry(mount.transform));
+    view.spacing = std::make_unique<RouteSpacing>(params_.spacing, view.stored.image, *view.stored.camera, view.mount);
+    return view;
+  }
+
+  /** Stores a view, and adds it to the route. @throws ViewStoreError when it cannot be stored. */
+  void add(NewView&& view, const PlanarPose& base)
+  {
+    Route& route = recording_->route;
+    if (const std::string warning = routes_.views().save(view.stored, false); !warning.empty())
     {
       ROS_WARN_STREAM(warning);
     }
-    route.stops.push_back({ view.name, place.base, view.stamp });
-    recording_->spacing = std::move(spacing);
-    ROS_INFO_STREAM("stored view '" << view.name << "'");
+    route.stops.push_back({ view.stored.name, base, view.stored.stamp });
+    recording_->mount = view.mount;
+    recording_->spacing = std::move(view.spacing);
+    ROS_INFO_STREAM("stored view '" << view.stored.name << "'");
     if (route.stops.size() > 1)
     {
-      const PlanarPose moved = compose(inverse(route.stops[route.stops.size() - 2].base), place.base);
-      learn(recording_->last, view, moved);
+      const PlanarPose moved = compose(inverse(route.stops[route.stops.size() - 2].base), base);
+      learn(recording_->last, view.stored, moved);
       recording_->before = std::move(recording_->last);
     }
-    recording_->last = std::move(view);
+    recording_->last = std::move(view.stored);
   }
 
   /** Of the last view, from the one before. */

@@ -146,6 +146,40 @@ std::vector<std::string> findNames(const fs::path& directory)
   }
 }
 
+/** The views that a route alone names. */
+struct OwnViews
+{
+  std::vector<std::string> names;  // none while there is a doubt
+  std::string doubt;               // why it is not known which they are; empty: it is
+};
+
+OwnViews findOwnViews(const fs::path& directory, const std::string& name)
+{
+  OwnViews own;
+  std::set<std::string> needed;  // by other routes
+  for (const std::string& route : namesOfYamlFiles(directory))
+  {
+    try
+    {
+      const std::optional<Route> found = read(directory, route);
+      for (const RouteStop& stop : found ? found->stops : std::vector<RouteStop>())
+      {
+        route == name ? own.names.push_back(stop.view) : static_cast<void>(needed.insert(stop.view));
+      }
+    }
+    catch (const std::exception&)
+    {
+      own.doubt = route == name ? "it is damaged and does not say which they are"
+                                : "route '" + route + "' is damaged and may need them";
+    }
+  }
+  const auto is_kept = [&](const std::string& view) {
+    return !own.doubt.empty() || needed.count(view) > 0;
+  };
+  own.names.erase(std::remove_if(own.names.begin(), own.names.end(), is_kept), own.names.end());
+  return own;
+}
+
 /** Copies what has been learnt of a view; what is damaged of it is left out, as it is learnt anew. */
 void copyStructure(const ViewStore& from, const ViewStore& to, const std::string& view)
 {
@@ -319,6 +353,22 @@ void RouteStore::rename(const std::string& from, const std::string& to) const
   });
 }
 
+std::vector<std::string> RouteStore::ownViews(const std::string& name) const
+{
+  return about("replace", name, [&] {
+    if (!has(name))
+    {
+      fail("replace", name, NO_SUCH_ROUTE);
+    }
+    OwnViews own = findOwnViews(directory_, name);
+    if (!own.doubt.empty())
+    {
+      fail("replace", name, own.doubt);
+    }
+    return std::move(own.names);
+  });
+}
+
 std::string RouteStore::remove(const std::string& name) const
 {
   return about("remove", name, [&] {
@@ -327,42 +377,22 @@ std::string RouteStore::remove(const std::string& name) const
     {
       fail("remove", name, has(name) ? yaml.string() + " is not a file" : NO_SUCH_ROUTE);
     }
-    std::vector<RouteStop> stops;
-    std::set<std::string> needed;
-    std::string warning;
+    OwnViews own;
     {
       const DirectoryLock lock(directory_);
-      for (const std::string& route : namesOfYamlFiles(directory_))
-      {
-        try
-        {
-          const std::optional<Route> found = read(directory_, route);
-          for (const RouteStop& stop : found ? found->stops : std::vector<RouteStop>())
-          {
-            route == name ? stops.push_back(stop) : static_cast<void>(needed.insert(stop.view));
-          }
-        }
-        catch (const std::exception&)
-        {
-          warning = route == name ? "its views are kept, as it is damaged and does not say which they are"
-                                  : "its views are kept, as route '" + route + "' is damaged and may need them";
-        }
-      }
-      if (!warning.empty())
-      {
-        stops.clear();
-      }
+      own = findOwnViews(directory_, name);
       fs::remove(yaml);
       fs::remove(yaml.string() + ".tmp");
       syncDirectory(directory_);
     }
-    for (const RouteStop& stop : stops)
+    std::string warning = own.doubt.empty() ? "" : "its views are kept, as " + own.doubt;
+    for (const std::string& view : own.names)
     {
       try
       {
-        if (needed.count(stop.view) == 0 && fs::exists(yamlPath(views_.directory(), stop.view)))
+        if (fs::exists(yamlPath(views_.directory(), view)))
         {
-          views_.remove(stop.view);
+          views_.remove(view);
         }
       }
       catch (const ViewStoreError& error)

@@ -59,6 +59,16 @@ TEST_F(RoutesTest, ReplacesARouteWhenItIsAskedTo)
   EXPECT_NE(start("again", recorder).find("refused"), std::string::npos);
   camera_ = true;
   EXPECT_EQ(store_->load("again").stops.size(), views[1]) << "it is kept until there is something to replace it with";
+  lost_ = true;
+  EXPECT_NE(start("again", recorder).find("nowhere"), std::string::npos);
+  lost_ = false;
+  EXPECT_EQ(store_->load("again").stops.size(), views[1]) << "it is kept while tf does not know the camera";
+  StoredView other = store_->views().load("again_001");
+  other.name = "again_099";
+  store_->views().save(other, false);
+  EXPECT_NE(start("again", recorder).find("there is a view 'again_099' already"), std::string::npos);
+  EXPECT_EQ(store_->load("again").stops.size(), views[1]) << "it is kept while a name is in use";
+  store_->views().remove(other.name);
   store_->rename("again", "renamed");
   EXPECT_NE(start("again", recorder).find("there is a view 'again_00"), std::string::npos) << "another route's";
   EXPECT_NE(start("renamed", recorder).find("there is one of that name"), std::string::npos);

@@ -50,7 +50,9 @@ protected:
         "camera/image_raw", 5, boost::function<void(const sensor_msgs::Image::ConstPtr&)>([this](const auto& message) {
           if (camera_)
           {
-            images_.publish(message);
+            sensor_msgs::Image image = *message;
+            image.header.frame_id = lost_ ? "nowhere" : image.header.frame_id;
+            images_.publish(image);
           }
         }));
     info_subscriber_ = nh_.subscribe<sensor_msgs::CameraInfo>(
@@ -58,7 +60,9 @@ protected:
         boost::function<void(const sensor_msgs::CameraInfo::ConstPtr&)>([this](const auto& message) {
           if (camera_)
           {
-            infos_.publish(message);
+            sensor_msgs::CameraInfo info = *message;
+            info.header.frame_id = lost_ ? "nowhere" : info.header.frame_id;
+            infos_.publish(info);
           }
         }));
     matches_subscriber_ =
@@ -82,6 +86,7 @@ protected:
   void TearDown() override
   {
     camera_ = true;
+    lost_ = false;
     client_.cancelAllGoals();
     EXPECT_TRUE(waitUntil([this] { return !commands_.moving(); }));
   }
@@ -234,6 +239,7 @@ protected:
   ros::NodeHandle nh_;
   std::unique_ptr<RouteStore> store_;
   std::atomic<bool> camera_{ true };  // is handed on
+  std::atomic<bool> lost_{ false };   // tf does not know where the camera is
   ros::Publisher images_ = nh_.advertise<sensor_msgs::Image>("seen/image_raw", 5);
   ros::Publisher infos_ = nh_.advertise<sensor_msgs::CameraInfo>("seen/camera_info", 5);
   ros::Publisher drive_ = nh_.advertise<geometry_msgs::Twist>("cmd_vel", 5);

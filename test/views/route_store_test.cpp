@@ -292,6 +292,9 @@ TEST_F(RouteStoreTest, RemovesTheViewsThatNoOtherRouteNeeds)
   shared.stops.push_back({ "mine", {}, 0.0 });
   store_.save(shared);
   saveView("bystander");
+  EXPECT_EQ(store_.ownViews("a"), Names{ "a_003" });
+  EXPECT_EQ(store_.ownViews("b"), Names{ "mine" });
+  EXPECT_ERROR(store_.ownViews("c"), "there is none of that name");
   EXPECT_EQ(store_.remove("a"), "");
   EXPECT_EQ(store_.list().names, Names{ "b" });
   EXPECT_EQ(store_.views().list().names, (Names{ "a_001", "a_002", "bystander", "mine" }));

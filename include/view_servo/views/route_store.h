@@ -86,6 +86,11 @@ public:
   void rename(const std::string& from, const std::string& to) const;
 
   /**
+   * The views that remove() would remove, in the route's order: those that no other route names. @throws
+   * RouteStoreError when there is no such route, or it or another one is damaged, so that this is not known.
+   */
+  std::vector<std::string> ownViews(const std::string& name) const;
+  /**
    * Removes a route, and then those of its views that no other route names; none while a route is damaged.
    * @return a warning in one line when views were kept; else empty. @throws RouteStoreError when there is no
    * such route.
