@@ -60,7 +60,8 @@ cv::Mat toThumbnail(const sensor_msgs::Image& image, const cv::Rect& region)
   const cv::Mat grey = toGrey(image, "image");
   const double scale = WIDTH / grey.cols;
   cv::Mat thumbnail;
-  cv::resize(grey, thumbnail, {}, scale, scale, cv::INTER_AREA);
+  cv::resize(grey, thumbnail, { static_cast<int>(WIDTH), std::max(1, cvRound(scale * grey.rows)) }, 0.0, 0.0,
+             cv::INTER_AREA);
   if (!region.empty())
   {
     const cv::Rect frame(cvRound(region.x * scale), cvRound(region.y * scale), cvRound(region.width * scale),
@@ -344,6 +345,23 @@ public:
     }
   }
 
+  /** For topics and views, and waits with the next look. What hinders it stands where the views would. */
+  void look(ServiceCaller& caller)
+  {
+    const Clock::time_point begin = Clock::now();
+    try
+    {
+      lookForTopics();
+      lookForViews(caller, false);
+    }
+    catch (const std::exception& error)
+    {
+      const std::lock_guard<std::mutex> lock(mutex_);
+      data_.views_fault = oneLine(error);
+    }
+    rest(secondsSince(begin));
+  }
+
   /** Lists the views, and reads those that are not known. @param all also those that are. */
   void lookForViews(ServiceCaller& caller, bool all)
   {
@@ -551,11 +569,19 @@ private:
     GetView service;
     service.request.name = name;
     view.fault = ask(caller, "view_store/get", service, LIST_PATIENCE);
-    if (view.fault.empty())
+    if (!view.fault.empty())
+    {
+      return view;
+    }
+    try
     {
       const sensor_msgs::Image& image = service.response.image;
       view.thumbnail = toThumbnail(image, toRect(service.response.roi, cv::Size(image.width, image.height)));
       view.stamp = image.header.stamp.toSec();
+    }
+    catch (const std::exception& error)
+    {
+      view.fault = oneLine(error);  // of this view alone
     }
     return view;
   }
@@ -816,12 +842,7 @@ RobotSnapshot RobotLink::snapshot()
   }
   if (core_->isTimeToLook() && views_.isIdle())
   {
-    views_.add(task([](Core& core, ServiceCaller& caller) {
-      const Clock::time_point begin = Clock::now();
-      core.lookForTopics();
-      core.lookForViews(caller, false);
-      core.rest(secondsSince(begin));
-    }));
+    views_.add(task([](Core& core, ServiceCaller& caller) { core.look(caller); }));
   }
   return core_->snapshot();
 }
