@@ -2,8 +2,12 @@
 # Copyright (c) 2026, the view_servo authors
 # SPDX-License-Identifier: BSD-3-Clause
 """The node record_run beside a driver and a camera that this test plays: what it records, when, and the page it has made."""
+import errno
+import importlib.machinery
+import importlib.util
 import json
 import os
+import resource
 import signal
 import sys
 import threading
@@ -143,6 +147,31 @@ class RecordRun(graph.GraphTest):
         self.assertEqual(set(stamps["/run_view"]), {10**9})
         self.assertEqual(facts[-1]["view"]["name"], "dock")
         self.assertEqual(facts[-1]["parameters"], {"/homing": {"max_speed": 0.25}})
+
+    def test_a_full_disk_ends_one_recording(self):
+        sys.dont_write_bytecode = True
+        loader = importlib.machinery.SourceFileLoader("record_run", os.path.join(ROOT, "scripts", "record_run"))
+        record_run = importlib.util.module_from_spec(importlib.util.spec_from_loader("record_run", loader))
+        loader.exec_module(record_run)
+        full, good = (os.path.join(self.directory, name) for name in ("full.bag", "good.bag"))
+        recordings = [record_run.Recording(path) for path in (full, good)]
+        image = Image(width=640, height=480, step=640, encoding="mono8", data=os.urandom(640 * 480))
+        limits = resource.getrlimit(resource.RLIMIT_FSIZE)
+        resource.setrlimit(resource.RLIMIT_FSIZE, (1000000, limits[1]))  # one may be full before the other is
+        try:
+            for second in range(1, 11):
+                recordings[0].write("image", image, rospy.Time(second))
+        finally:
+            resource.setrlimit(resource.RLIMIT_FSIZE, limits)
+        for second in range(1, 11):
+            recordings[1].write("image", image, rospy.Time(second))
+        self.assertEqual(recordings[0].fault.errno, errno.EFBIG)
+        with self.assertRaises(OSError) as raised:
+            recordings[0].close()
+        self.assertEqual((raised.exception.filename, raised.exception.strerror), (full, os.strerror(errno.EFBIG)))
+        recordings[1].close()
+        with rosbag.Bag(good) as bag:
+            self.assertEqual(bag.get_message_count(), 10)
 
     def test_a_place_that_cannot_be_written(self):
         path = "/proc/nowhere/run.bag"
