@@ -105,6 +105,10 @@ Finding judgeCalibration(const CameraObservations& camera)
   {
     return error(name, camera.calibration_fault, "calibrate the camera at this size (camera_calibration)");
   }
+  if (!std::isfinite(camera.focal_length))
+  {
+    return warning(name, "not known: no image has come with its camera_info", "see to camera_info first");
+  }
   const std::string& topic = camera.images.topic;
   const std::string transport = "/compressed";
   const bool is_compressed = topic.size() > transport.size() &&

@@ -22,6 +22,17 @@ void refuseToReplace(const std::string& path, const std::string& option, bool ov
   }
 }
 
+/** @throws std::runtime_error when two options name one file, so that the one would be lost. */
+void refuseSameFile(const std::string& path, const std::string& option, const std::string& other,
+                    const std::string& other_option)
+{
+  namespace fs = std::filesystem;
+  if (!path.empty() && !other.empty() && fs::weakly_canonical(path) == fs::weakly_canonical(other))
+  {
+    throw std::runtime_error(option + ": '" + path + "' is the file of " + other_option + ", too: name another");
+  }
+}
+
 /** So that nobody learns after sixteen poses that nothing can be kept. */
 void requireWritable(const std::string& path, const std::string& option)
 {
@@ -31,6 +42,10 @@ void requireWritable(const std::string& path, const std::string& option)
   }
   const std::filesystem::path parent = std::filesystem::path(path).parent_path();
   const std::string directory = parent.empty() ? "." : parent.string();
+  if (std::filesystem::is_directory(path))
+  {
+    throw std::runtime_error(option + ": '" + path + "' is a directory: name a file in it");
+  }
   if (!std::filesystem::is_directory(directory))
   {
     throw std::runtime_error(option + ": there is no directory '" + directory + "': make it first");
@@ -93,6 +108,13 @@ bool readCalibrationOptions(CommandLine& line, int argc, char** argv, const Cali
   {
     throw std::runtime_error("say which stored view: --view NAME");
   }
+  if (options.out.empty())
+  {
+    throw std::runtime_error("--out: name the file to write");
+  }
+  refuseSameFile(options.keep, "--keep", options.out, "--out");
+  refuseSameFile(options.keep, "--keep", options.file, "--file");
+  refuseSameFile(options.out, "--out", options.file, "--file");
   refuseToReplace(options.out, "--out", options.overwrite);
   refuseToReplace(options.keep, "--keep", options.overwrite);
   requireWritable(options.out, "--out");

@@ -4,13 +4,13 @@
 #include "check_ros/robot_check.h"
 #include "check_ros/test_drive.h"
 #include "tools/check_robot_options.h"
+#include "tools/json_text.h"
 #include "tools/ros_program.h"
 #include "view_servo/parameters/error_text.h"
 #include "view_servo/ros/control_node.h"
 
 #include <poll.h>
 #include <ros/init.h>
-#include <ros/master.h>
 #include <ros/spinner.h>
 #include <unistd.h>
 #include <nlohmann/json.hpp>
@@ -21,6 +21,7 @@
 #include <exception>
 #include <iostream>
 #include <optional>
+#include <stdexcept>
 #include <string>
 #include <utility>
 #include <vector>
@@ -61,7 +62,7 @@ public:
   {
     if (options_.json)
     {
-      std::cout << toJson().dump(2) << std::endl;
+      std::cout << jsonText(toJson(), 2) << std::endl;
     }
     else
     {
@@ -173,10 +174,15 @@ Findings move(const check::RobotCheck& robot, const CheckOptions& options, const
 int run(const CheckOptions& options)
 {
   Report report(options);
-  if (!ros::master::check())
+  try
   {
-    report.add({ check::error("master", "no ROS master answers at " + ros::master::getURI(),
-                              "start the robot's launch file, or set ROS_MASTER_URI") });
+    requireMaster();
+  }
+  catch (const std::runtime_error& error)
+  {
+    const std::string text = error.what();
+    const std::size_t colon = text.find(": ");
+    report.add({ check::error("master", text.substr(0, colon), text.substr(colon + 2)) });
     return report.finish();
   }
   const ros::NodeHandle nh;

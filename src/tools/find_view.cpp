@@ -3,6 +3,7 @@
 #include "tools/find_view.h"
 
 #include "tools/command_line.h"
+#include "tools/json_text.h"
 #include "tools/stopwatch.h"
 #include "view_servo/views/prepared_image.h"
 #include "view_servo/views/view_recognizer.h"
@@ -106,7 +107,7 @@ bool findView(const FindOptions& options)
     {
       json["views"].push_back(resultOf(view));
     }
-    std::cout << json << '\n';
+    std::cout << jsonText(json) << '\n';
   }
   else
   {

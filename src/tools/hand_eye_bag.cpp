@@ -116,6 +116,11 @@ HandEyePosesFile posesIn(const HandEyeRecording& recording, const HandEyeSources
     throw std::runtime_error("its tf does not know '" + sources.flange_frame + "' in '" + sources.base_frame + "' (" +
                              lacks + "): record /tf and /tf_static, too, or say " + sources.frameOptions());
   }
+  if (result.camera_frame.empty())
+  {
+    throw std::runtime_error("what is on '" + topic +
+                             "' has no frame_id: let the camera's driver name the camera's frame");
+  }
   result.base_frame = sources.base_frame;
   result.flange_frame = sources.flange_frame;
   result.view_name = sources.view;

@@ -2,6 +2,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "tools/hand_eye_session.h"
 
+#include "tools/ros_program.h"
 #include "view_servo/SetView.h"
 #include "view_servo/parameters/error_text.h"
 #include "view_servo/ros/call_service.h"
@@ -55,6 +56,10 @@ HandEyeSession::HandEyeSession(const ros::NodeHandle& nh, const HandEyeSources& 
   }
   collector_ = HandEyeCollector(handEyeViewOf(stored, camera));
   camera_frame_ = withoutSlash(info->header.frame_id);
+  if (camera_frame_.empty())
+  {
+    throw std::runtime_error("'" + info_topic + "' has no frame_id: let the camera's driver name the camera's frame");
+  }
   wait_for([&] {
     const std::string missing = transforms_.missing(sources_.base_frame, sources_.flange_frame, ros::Time(0));
     return missing.empty() ? missing : missing + ": say " + sources_.frameOptions() + " with the robot's frames";
@@ -72,15 +77,24 @@ HandEyeSession::HandEyeSession(const ros::NodeHandle& nh, const HandEyeSources& 
                                 sources_.camera) +
                      " starts it";
   });
-  SetView service;
-  service.request.view = sources.view;
-  if (!callService(start, service))
+  constexpr std::chrono::seconds ANSWER_PATIENCE{ 10 };
+  const std::optional<SetView::Response> answer = within(ANSWER_PATIENCE, [start, view = sources.view] {
+    SetView service;
+    service.request.view = view;
+    if (!callService(start, service))
+    {
+      service.response.success = 0;
+      service.response.message = "the service '" + start + "' cannot be called, or has failed: start its node anew";
+    }
+    return service.response;
+  });
+  if (!answer)
   {
-    throw std::runtime_error("the service '" + start + "' does not answer");
+    throw std::runtime_error("the service '" + start + "' does not answer: its node hangs; start it anew");
   }
-  if (service.response.success == 0)
+  if (answer->success == 0)
   {
-    throw std::runtime_error("view '" + sources.view + "' cannot be followed: " + service.response.message);
+    throw std::runtime_error("view '" + sources.view + "' cannot be followed: " + answer->message);
   }
   constexpr std::uint32_t QUEUE = 20;
   homography_subscriber_ =
@@ -175,7 +189,10 @@ bool HandEyeSession::take(const Homography& message)
   constexpr double NO_WAIT = 0.0;
   const Eigen::Isometry3d flange_in_base = toIsometry(
       transforms_.lookUp(sources_.base_frame, sources_.flange_frame, message.header.stamp, NO_WAIT).transform);
-  camera_frame_ = withoutSlash(message.header.frame_id);
+  if (!message.header.frame_id.empty())
+  {
+    camera_frame_ = withoutSlash(message.header.frame_id);
+  }
   return collector_.add(message.header.stamp.toSec(), homographyOf(message), flange_in_base);
 }
 

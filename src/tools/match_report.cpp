@@ -3,6 +3,7 @@
 #include "tools/match_report.h"
 
 #include "tools/command_line.h"
+#include "tools/json_text.h"
 #include "view_servo/geometry/region.h"
 #include "view_servo/views/overlay.h"
 
@@ -217,7 +218,7 @@ bool MatchReport::write(const ViewMatch& match, const PreparedImage& reference, 
   {
     nlohmann::json json = resultOf(match, corner_error);
     json.update(more);
-    std::cout << json << '\n';
+    std::cout << jsonText(json) << '\n';
   }
   else
   {

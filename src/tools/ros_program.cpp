@@ -32,7 +32,14 @@ void initQuietly(int argc, char** argv, const std::string& name, std::uint32_t o
 
 void requireMaster()
 {
-  if (!ros::master::check())
+  constexpr std::chrono::seconds PATIENCE{ 3 };
+  const std::optional<bool> is_there = within(PATIENCE, [] { return ros::master::check(); });
+  if (!is_there)
+  {
+    throw std::runtime_error("the ROS master at " + ros::master::getURI() +
+                             " does not answer: it hangs, or the network drops what is sent to it");
+  }
+  if (!*is_there)
   {
     throw std::runtime_error("no ROS master answers at " + ros::master::getURI() +
                              ": start the robot's launch file, or set ROS_MASTER_URI");

@@ -4,9 +4,17 @@
 
 #include "tools/command_line.h"
 
+#include "view_servo/ros/steady_wait.h"
+
+#include <chrono>
+#include <condition_variable>
 #include <cstdint>
+#include <memory>
+#include <mutex>
 #include <optional>
 #include <string>
+#include <thread>
+#include <utility>
 #include <vector>
 
 namespace view_servo
@@ -26,7 +34,32 @@ std::optional<std::vector<std::string>> parseWithoutRosWords(CommandLine& line, 
  */
 void initQuietly(int argc, char** argv, const std::string& name, std::uint32_t options = 0);
 
-/** @throws std::runtime_error when no ROS master answers, with what to do in one line. */
+/** @throws std::runtime_error when no ROS master answers within a few seconds, with what to do in one line. */
 void requireMaster();
+
+/**
+ * What `body` returns. It runs in a thread of its own, as roscpp gives its calls no deadline, which is left behind when
+ * it takes longer: `body` must not throw, nor refer to what may be gone by then. @return empty when it takes longer.
+ */
+template <typename Body>
+auto within(std::chrono::seconds longest, Body body) -> std::optional<decltype(body())>
+{
+  struct Shared
+  {
+    std::mutex mutex;
+    std::condition_variable condition;
+    std::optional<decltype(body())> result;
+  };
+  const auto shared = std::make_shared<Shared>();
+  std::thread([shared, body = std::move(body)]() mutable {
+    auto result = body();
+    const std::lock_guard<std::mutex> lock(shared->mutex);
+    shared->result = std::move(result);
+    shared->condition.notify_all();
+  }).detach();
+  std::unique_lock<std::mutex> lock(shared->mutex);
+  waitSteadily(shared->condition, lock, longest, [&] { return shared->result.has_value(); });
+  return std::move(shared->result);
+}
 
 }  // namespace view_servo

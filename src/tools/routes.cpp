@@ -101,7 +101,9 @@ int main(int argc, char** argv)
         "It ends with status 0, 1 when that cannot be, or 2 when the command line is wrong.");
     line.text("views_dir", directory, "directory of the stored views; empty: $ROS_HOME/view_servo/views");
     const std::optional<std::vector<std::string>> words = line.parse(argc, argv);
-    return words ? run(RouteStore(viewsDir(directory)), *words) : DONE;
+    const int status = words ? run(RouteStore(viewsDir(directory)), *words) : DONE;
+    requireWritten(std::cout);
+    return status;
   }
   catch (const CommandLineError& error)
   {

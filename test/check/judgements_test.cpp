@@ -168,6 +168,8 @@ TEST(CheckJudgements, NameEachFaultOfTheCamera)
       },
       "camera_info", Level::ERROR, "no camera_info comes" },
     { "half of the images", [](Everything& a) { a.camera.pairs = 50; }, "camera_info", Level::WARNING, "50 of 100" },
+    { "never paired", [](Everything& a) { a.camera.focal_length = UNKNOWN; }, "calibration", Level::WARNING,
+      "not known" },
     { "uncalibrated", [](Everything& a) { a.camera.calibration_fault = "the camera is not calibrated"; }, "calibration",
       Level::ERROR, "not calibrated" },
     { "rectified",

@@ -6,6 +6,7 @@ The program `view` against view_store and a simulated base that homes, and again
 they are asked: each time it has to end in time, with the right status and a line that says what the matter is.
 """
 import contextlib
+import http.server
 import importlib.machinery
 import importlib.util
 import io
@@ -53,6 +54,11 @@ class Peer:
         self.port = self.socket.getsockname()[1]
         if not closed:
             self.socket.listen(10)
+
+
+class QuietPages(http.server.SimpleHTTPRequestHandler):
+    def log_message(self, *_):
+        pass
 
 
 class Driver:
@@ -218,6 +224,10 @@ class ViewCommands(graph.GraphTest):
             self.view_here(command + " --patience 0.3", CANNOT, "does not answer",
                            ROS_MASTER_URI="http://localhost:%d" % silent.port)
         self.view_here("list", CANNOT, "set it to http://HOST:11311", ROS_MASTER_URI="localhost")
+        pages = http.server.ThreadingHTTPServer(("localhost", 0), QuietPages)
+        threading.Thread(target=pages.serve_forever, daemon=True).start()
+        self.addCleanup(pages.shutdown)
+        self.view_here("list", CANNOT, "is no ROS master", ROS_MASTER_URI="http://localhost:%d" % pages.server_port)
         for command, space, complaint in (
                 ("list --patience 0.3", "/hanging", "/hanging/view_store/list does not answer within 0.3 s"),
                 ("list", "/dead", "/dead/view_store/list cannot be called"),

@@ -41,6 +41,14 @@ protected:
   }
 };
 
+TEST_F(MatchImagesFindTest, PrintsJsonOfNamesThatAreNotUtf8)
+{
+  write("views/caf\xe9.png", texturedPicture(5));
+  const ProgramRun outcome = run({ "find", path("views"), path("now.png"), "--json", "--max", "9" });
+  ASSERT_EQ(outcome.status, 0) << outcome.err;
+  EXPECT_EQ(json::parse(outcome.out)["indexed"], 5);
+}
+
 TEST_F(MatchImagesFindTest, NamesTheImageFileThatShowsTheScene)
 {
   const ProgramRun outcome = run({ "find", path("views"), path("now.png"), "--json", "--max", "2" });

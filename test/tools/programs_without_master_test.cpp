@@ -3,9 +3,14 @@
 
 /** @file Programs that work with ROS answer --help, and refuse a wrong command line, where no master is. */
 #include "support/program_run.h"
+#include "support/temporary_directory.h"
 #include "test_paths.h"
 
+#include <arpa/inet.h>
 #include <gtest/gtest.h>
+#include <netinet/in.h>
+#include <sys/socket.h>
+#include <unistd.h>
 
 #include <string>
 #include <vector>
@@ -89,6 +94,49 @@ TEST_P(OptionProgramTest, AnswersHelpAndRefusesAnUnknownOption)
 INSTANTIATE_TEST_SUITE_P(Programs, OptionProgramTest,
                          testing::Values(CALIBRATE_HAND_EYE_PATH, CALIBRATE_MOUNT_PATH, CHECK_ROBOT_PATH,
                                          PICK_VIEW_PATH));
+
+/** A master that takes connections, and never says a word. */
+TEST(Programs, DoNotWaitForAMasterThatHangs)
+{
+  const int listener = socket(AF_INET, SOCK_STREAM, 0);
+  sockaddr_in address{};
+  address.sin_family = AF_INET;
+  address.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
+  socklen_t length = sizeof(address);
+  ASSERT_EQ(bind(listener, reinterpret_cast<const sockaddr*>(&address), length), 0);
+  ASSERT_EQ(listen(listener, 10), 0);
+  ASSERT_EQ(getsockname(listener, reinterpret_cast<sockaddr*>(&address), &length), 0);
+  const std::string uri = "export ROS_MASTER_URI=http://localhost:" + std::to_string(ntohs(address.sin_port));
+  const TemporaryDirectory directory;
+  const std::string out = (directory.path() / "out.yaml").string();
+  const std::vector<std::vector<std::string>> commands = { { CALIBRATE_HAND_EYE_PATH, "--view", "x", "--out", out },
+                                                           { CALIBRATE_MOUNT_PATH, "--view", "x", "--out", out },
+                                                           { CHECK_ROBOT_PATH } };
+  for (const std::vector<std::string>& command : commands)
+  {
+    std::vector<std::string> words{ "--signal=KILL", "20" };
+    words.insert(words.end(), command.begin(), command.end());
+    const ProgramRun run = runProgram("timeout", words, uri);
+    EXPECT_TRUE(run.status == 1 || run.status == 2) << command[0] << ": " << run.status;
+    EXPECT_NE((run.out + run.err).find("does not answer"), std::string::npos) << run.out << run.err;
+  }
+  close(listener);
+}
+
+TEST(Calibrations, RefuseFilesThatWouldBeLost)
+{
+  const TemporaryDirectory directory;
+  const std::string file = (directory.path() / "poses.yaml").string();
+  for (const std::string program : { CALIBRATE_HAND_EYE_PATH, CALIBRATE_MOUNT_PATH })
+  {
+    expectBadInput(runWithoutMaster(program, { "--view", "x", "--keep", file, "--out", file }), "is the file of --out");
+    expectBadInput(runWithoutMaster(program, { "--file", file, "--out", file, "--overwrite" }),
+                   "is the file of --file");
+    expectBadInput(runWithoutMaster(program, { "--view", "x", "--out", "" }), "--out: name the file");
+    expectBadInput(runWithoutMaster(program, { "--view", "x", "--out", directory.path().string(), "--overwrite" }),
+                   "is a directory");
+  }
+}
 
 class NodeTest : public testing::TestWithParam<std::string>
 {
