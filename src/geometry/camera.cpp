@@ -294,7 +294,9 @@ Points Camera::distorted(const Points& points) const
     std::vector<cv::Point3d> rays(points.size());
     std::transform(points.begin(), points.end(), rays.begin(),
                    [](const Eigen::Vector2d& point) { return cv::Point3d(point.x(), point.y(), 1.0); });
-    cv::projectPoints(rays, cv::Vec3d(), cv::Vec3d(), intrinsics(*this), distortion, pixels);
+    // As many zeros as a driver likes are no distortion, but OpenCV takes certain numbers of coefficients only.
+    cv::projectPoints(rays, cv::Vec3d(), cv::Vec3d(), intrinsics(*this),
+                      isPinhole() ? std::vector<double>() : distortion, pixels);
   }
   Points result = fromCv(pixels);
   const double farthest = isPinhole() ? std::numeric_limits<double>::infinity() : farthestRay(*this);

@@ -119,28 +119,33 @@ void CameraWarp::makeMap() const
   {
     return;
   }
-  Points pixels;
-  pixels.reserve(static_cast<std::size_t>(to_.width) * static_cast<std::size_t>(to_.height));
-  for (int v = 0; v < to_.height; ++v)
-  {
-    for (int u = 0; u < to_.width; ++u)
-    {
-      pixels.emplace_back(u, v);
-    }
-  }
-  const Points at = from_.distorted(turned(rotation_.transpose(), to_.normalized(pixels)));
   cv::Mat map(size(), CV_32FC2);
   seen_ = cv::Mat(size(), CV_8UC1);
-  std::size_t i = 0;
-  for (int v = 0; v < to_.height; ++v)
+  constexpr int ROWS = 64;  // at a time: the rays of all pixels of a large image take a gigabyte
+  for (int top = 0; top < to_.height; top += ROWS)
   {
-    for (int u = 0; u < to_.width; ++u, ++i)
+    const int bottom = std::min(top + ROWS, to_.height);
+    Points pixels;
+    pixels.reserve(static_cast<std::size_t>(to_.width) * static_cast<std::size_t>(bottom - top));
+    for (int v = top; v < bottom; ++v)
     {
-      const bool inside =
-          at[i].x() >= 0.0 && at[i].x() <= from_.width - 1.0 && at[i].y() >= 0.0 && at[i].y() <= from_.height - 1.0;
-      map.at<cv::Vec2f>(v, u) =
-          inside ? cv::Vec2f(static_cast<float>(at[i].x()), static_cast<float>(at[i].y())) : cv::Vec2f::all(-2.0F);
-      seen_.at<unsigned char>(v, u) = inside ? 255 : 0;
+      for (int u = 0; u < to_.width; ++u)
+      {
+        pixels.emplace_back(u, v);
+      }
+    }
+    const Points at = from_.distorted(turned(rotation_.transpose(), to_.normalized(pixels)));
+    std::size_t i = 0;
+    for (int v = top; v < bottom; ++v)
+    {
+      for (int u = 0; u < to_.width; ++u, ++i)
+      {
+        const bool inside =
+            at[i].x() >= 0.0 && at[i].x() <= from_.width - 1.0 && at[i].y() >= 0.0 && at[i].y() <= from_.height - 1.0;
+        map.at<cv::Vec2f>(v, u) =
+            inside ? cv::Vec2f(static_cast<float>(at[i].x()), static_cast<float>(at[i].y())) : cv::Vec2f::all(-2.0F);
+        seen_.at<unsigned char>(v, u) = inside ? 255 : 0;
+      }
     }
   }
   cv::convertMaps(map, cv::noArray(), positions_, weights_, CV_16SC2);

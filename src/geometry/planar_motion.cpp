@@ -159,6 +159,10 @@ struct PoseProblem
         continue;
       }
       const Eigen::Vector2d residual = point.hnormalized() - sighting.current;
+      if (!(residual.squaredNorm() < limit * limit))
+      {
+        continue;  // an outlier, or no number
+      }
       Eigen::Matrix3d motion;
       motion.col(0) = Eigen::Vector3d(0.0, 0.0, rho);
       motion.col(1) = Eigen::Vector3d(-rho, 0.0, 0.0);

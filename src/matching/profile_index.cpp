@@ -26,6 +26,7 @@ namespace
 constexpr int DIRECTING_FEATURE = 1;
 // ... and the tree holds each reference profile in the directions in which it is at least minus this. [deviations]
 constexpr float DIRECTION_MARGIN = 0.5F;
+constexpr std::size_t MOST_SIMILAR = 1000;  // profiles that one votes for
 
 void reverse(const float* feature, std::size_t columns, float* reversed)
 {
@@ -64,7 +65,8 @@ std::vector<Parameter> parameters(ProfileSearchParams& params)
         "a profile votes for its nearest (K_v), for all in a radius (D_v), or for those that the index keeps where it "
         "belongs"),
     integer("search_neighbours", params.neighbours, "", "[1, 1000]", "K_v: profiles that each votes for"),
-    real("search_radius", params.radius, "standard deviations", "> 0", "D_v: distance of similar profiles"),
+    real("search_radius", params.radius, "standard deviations", "> 0",
+         "D_v: distance of similar profiles, of which the 1000 nearest count"),
     real("search_epsilon", params.epsilon, "", ">= 0", "tolerance of the search for the nearest, 0 = exact"),
     real("search_share", params.share, "", "(0, 1]", "part of the profiles that votes, the most distinctive ones"),
   };
@@ -131,6 +133,7 @@ struct ProfileIndex::Tree
     if (params.search == ProfileSearch::RADIUS)
     {
       tree.findWithin(query, static_cast<float>(params.radius), found);
+      found.resize(std::min(found.size(), MOST_SIMILAR));  // on a repeated pattern all are similar to all
     }
     else
     {

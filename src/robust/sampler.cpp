@@ -11,7 +11,8 @@ namespace view_servo
 {
 namespace
 {
-constexpr int MAX_DRAWS = 1000;  // for one entry that shares no row or column
+constexpr int MAX_DRAWS = 1000;    // for one entry that shares no row or column
+constexpr int MAX_RESTARTS = 100;  // of one sample
 
 std::vector<int> firstNumbers(std::size_t count)
 {
@@ -154,16 +155,24 @@ bool ImportanceSampler::draw(Rng& rng, std::vector<int>& sample)
   {
     return false;
   }
+  int restarts = 0;
   for (int draws = 0; sample.size() < size_; ++draws)
   {
     if (draws > MAX_DRAWS)
     {
-      return false;  // there are too few rows or columns
+      if (restarts >= MAX_RESTARTS)
+      {
+        return false;  // there are too few rows or columns
+      }
+      ++restarts;  // what was drawn first may leave no place for the others
+      sample.clear();
+      draws = 0;
     }
     const int entry = drawEntry(rng);
     if (!collides(entry, sample, sample.size()))
     {
       sample.push_back(entry);
+      draws = 0;
     }
   }
   return true;

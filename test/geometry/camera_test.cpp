@@ -217,6 +217,16 @@ TEST(Camera, ModelWithoutCoefficientsIsNotDistorted)
   Camera camera = plumbBob();
   camera.distortion.clear();
   EXPECT_EQ(camera.project({ 0.2, -0.1, 2.0 }), pinhole().project({ 0.2, -0.1, 2.0 }));
+  for (const std::string model : { "", "none" })
+  {
+    camera.distortion_model = model;
+    for (std::size_t zeros = 0; zeros <= 15; ++zeros)
+    {
+      camera.distortion.assign(zeros, 0.0);
+      EXPECT_EQ(camera.fault(), "") << zeros;
+      EXPECT_EQ(camera.project({ 0.2, -0.1, 2.0 }), pinhole().project({ 0.2, -0.1, 2.0 })) << zeros;
+    }
+  }
 }
 
 TEST(Camera, GivesNaNWhereThereIsNoAnswer)

@@ -402,6 +402,19 @@ TEST(RefinePlanarPose, IsExactOnExactData)
   EXPECT_NEAR(found.yaw, truth.yaw, 1e-8);  // wrapped
 }
 
+TEST(RefinePlanarPose, LeavesOutWhatIsNoNumber)
+{
+  Rng rng(5);
+  const TwoCameras cameras({ -0.4, 0.2, -0.1 });
+  const PlanarPose& truth = cameras.reference_in_current;
+  std::vector<Sighting> sightings = sightingsOf(cameras, 30, 0, 0.0, rng);
+  sightings[3].current.x() = NOT_A_NUMBER;
+  sightings[7].landmark.inverse_depth = NOT_A_NUMBER;
+  sightings[9].landmark.inverse_depth = std::numeric_limits<double>::infinity();
+  const PlanarPose found = refinePlanarPose({ truth.x + 0.01, truth.y - 0.01, truth.yaw + 0.005 }, sightings, WIDTH);
+  EXPECT_LT(difference(found, truth), 1e-8);
+}
+
 TEST(RefinePlanarPose, WhatDoesNotDetermineItLeavesItAsItWas)
 {
   const PlanarPose initial{ 0.5, 0.1, 0.2 };

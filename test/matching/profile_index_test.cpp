@@ -142,6 +142,24 @@ TEST(ProfileIndex, FindsOnlyWhatLiesWithinTheRadius)
   EXPECT_EQ(total, expected);  // the radius is not above the margin within which both directions are kept
 }
 
+TEST(ProfileIndex, FindsOnlyTheNearestThousandOfARepeatedPattern)
+{
+  ProfileSet reference = randomProfiles(3000, 4, 4);
+  for (float& feature : reference.features)
+  {
+    feature *= 0.01F;
+  }
+  ProfileSearchParams params;
+  params.search = ProfileSearch::RADIUS;
+  params.radius = 0.5;
+  const auto found = ProfileIndex(reference).search(reference, params);
+  for (std::size_t c = 0; c < found.size(); ++c)
+  {
+    ASSERT_EQ(found[c].size(), 1000U);
+    EXPECT_EQ(found[c][0].reference, static_cast<int>(c));
+  }
+}
+
 TEST(ProfileIndex, FindsInALeafWhatIsMuchNearerThanOthers)
 {
   const ProfileSet reference = randomProfiles(2000, 8, 11);

@@ -393,4 +393,17 @@ TEST(ImportanceSampler, DrawsByWeightAndSharesNoRowOrColumn)
   EXPECT_FALSE(four.draw(rng, sample));  // there are three rows
 }
 
+TEST(ImportanceSampler, BeginsAnewWhereTheFirstLeavesNoPlace)
+{
+  const AssociationMatrix association(2, 2, { { 0, 0, 20.0 }, { 0, 1, 1.0 }, { 1, 0, 1.0 } });
+  ImportanceSampler sampler(association, 2, 10);
+  Rng rng(3);
+  std::vector<int> sample;
+  for (int i = 0; i < 50; ++i)
+  {
+    ASSERT_TRUE(sampler.draw(rng, sample)) << i;
+    EXPECT_EQ(sample[0] + sample[1], 3) << "both entries that share nothing";
+  }
+}
+
 }  // namespace view_servo
