@@ -623,7 +623,7 @@ ViewMatch LineViewMatcher::match(const PreparedImage& reference, const PreparedI
     Rng rng(params_.seed);
     // Corners are found in less time in the images of half the size, but fewer.
     const int level = result.log_significance < DOUBTFUL ? 0 : 2;
-    if (isMirrored(reference, level, current, level, result.planes, rng))
+    if (isMirrored(reference, level, current, level, result.planes, result.log_significance, rng))
     {
       refuse(result);
       result.fundamental.setConstant(NOT_A_NUMBER);

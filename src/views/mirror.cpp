@@ -112,7 +112,7 @@ std::size_t mostFound(const cv::Mat& reference, const std::vector<Corner>& corne
 }  // namespace
 
 bool isMirrored(const PreparedImage& reference, int reference_level, const PreparedImage& current, int current_level,
-                std::vector<Eigen::Matrix3d> planes, Rng& rng)
+                std::vector<Eigen::Matrix3d> planes, double significance, Rng& rng)
 {
   constexpr double SHARE = 0.3;    // of the profiles
   constexpr int ITERATIONS = 300;  // enough where a third of the candidates agrees
@@ -127,6 +127,10 @@ bool isMirrored(const PreparedImage& reference, int reference_level, const Prepa
   if (turned.significance <= params.min_log_significance)
   {
     return false;
+  }
+  if (planes.empty())
+  {
+    return turned.significance > significance;
   }
   const Eigen::Matrix3d to_level = current.toFull(current_level).inverse();
   for (Eigen::Matrix3d& plane : planes)

@@ -25,9 +25,11 @@ constexpr const char* MIRRORED =
  * the reference's corners look alike along them: an oblique view, which few profiles show, is not refused for what
  * little matches mirrored.
  * @param reference_level, current_level the scales at which the images match.
- * @param planes that the geometry that was found agrees with, x_cur ~ H x_ref in pixels of the full images.
+ * @param planes that the geometry that was found agrees with, x_cur ~ H x_ref in pixels of the full images; where it
+ * has none, its significance decides.
+ * @param significance -log10 of the false alarms of that geometry.
  */
 bool isMirrored(const PreparedImage& reference, int reference_level, const PreparedImage& current, int current_level,
-                std::vector<Eigen::Matrix3d> planes, Rng& rng);
+                std::vector<Eigen::Matrix3d> planes, double significance, Rng& rng);
 
 }  // namespace view_servo

@@ -272,7 +272,8 @@ public:
       {
         planes.push_back(*plane);
       }
-      const bool mirrored = isMirrored(reference_, levels_.reference, current_, levels_.current, planes, rng);
+      const bool mirrored =
+          isMirrored(reference_, levels_.reference, current_, levels_.current, planes, result.log_significance, rng);
       refusal_ = mirrored ? Refusal::MIRRORED : Refusal::NONE;
       clock.finish("mirror");
     }

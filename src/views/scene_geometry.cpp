@@ -141,7 +141,11 @@ bool SceneGeometry::fit(const std::optional<Eigen::Matrix3d>& other, RansacStati
       consider(*hypothesis);
     }
   }
-  return best_ && best_->margin >= 0.0 && keepsOrientation(agreeing(best_->f), IN_ORDER);
+  if (best_ && !(best_->margin >= 0.0 && keepsOrientation(agreeing(best_->f), IN_ORDER)))
+  {
+    best_.reset();  // what is refused is not to judge a plane
+  }
+  return best_.has_value();
 }
 
 bool SceneGeometry::isRepeated()
@@ -171,6 +175,12 @@ bool SceneGeometry::isRepeated()
     }
   }
   return 2 * unique.size() < all;
+}
+
+double SceneGeometry::significance() const
+{
+  const Plane* plane = bestPlane();
+  return best_ ? best_->significance : plane != nullptr ? plane->significance : 0.0;
 }
 
 std::vector<Eigen::Matrix3d> SceneGeometry::planes() const

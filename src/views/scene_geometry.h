@@ -54,6 +54,9 @@ public:
   /** Whether what agrees lies for the most part on planes that are found elsewhere nearly as well. */
   bool isRepeated();
 
+  /** -log10 of the false alarms of what was found: by fit(), else of the best plane. */
+  double significance() const;
+
   /** All planes that corners confirm. */
   std::vector<Eigen::Matrix3d> planes() const;
 

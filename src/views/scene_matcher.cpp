@@ -91,8 +91,8 @@ bool findGeometry(const PreparedImage& reference, const PreparedImage& current, 
   }
   const bool repeated = params.points.unique && geometry.isRepeated();
   clock.finish("unique");
-  const bool mirrored =
-      !repeated && params.points.refuse_mirrored && isMirrored(reference, 0, current, 0, geometry.planes(), rng);
+  const bool mirrored = !repeated && params.points.refuse_mirrored &&
+                        isMirrored(reference, 0, current, 0, geometry.planes(), geometry.significance(), rng);
   clock.finish("mirror");
   if (repeated || mirrored)
   {

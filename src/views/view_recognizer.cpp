@@ -184,10 +184,17 @@ ViewRecognizer::Update ViewRecognizer::update(std::size_t most, std::chrono::ste
         to_read.emplace_back(name, revision);
       }
     }
-    doubtful_.clear();
+    update.waiting = to_read.size() - std::min(most, to_read.size());
+    to_read.resize(to_read.size() - update.waiting);
+    for (const auto& [name, revision] : to_read)
+    {
+      doubtful_.erase(name);
+    }
+    for (auto doubtful = doubtful_.begin(); doubtful != doubtful_.end();)
+    {
+      doubtful = wanted.count(*doubtful) == 0 ? doubtful_.erase(doubtful) : std::next(doubtful);
+    }
   }
-  update.waiting = to_read.size() - std::min(most, to_read.size());
-  to_read.resize(to_read.size() - update.waiting);
   for (const auto& [name, revision] : to_read)
   {
     try

@@ -1,5 +1,6 @@
 // Copyright (c) 2026, the view_servo authors
 // SPDX-License-Identifier: BSD-3-Clause
+#include "views/mirror.h"
 #include "support/matched_views.h"
 #include "support/room_corner.h"
 #include "support/textured_plane.h"
@@ -98,6 +99,15 @@ TEST(MirroredView, IsRefusedInARoom)
   EXPECT_NE(plane.outcome, MatchOutcome::MATCHED) << plane.message;
   const ViewMatch corner = test::matchScene(room.reference, mirrored(room.current));
   EXPECT_NE(corner.outcome, MatchOutcome::MATCHED) << corner.message;
+}
+
+TEST(MirroredView, IsWeighedAgainstAGeometryWithoutPlanes)
+{
+  const PreparedImage reference(symmetricFront(), {}, FeatureParams());
+  const PreparedImage current(test::disturbed(symmetricFront(), 0.9, 5.0, 2.0), {}, FeatureParams());
+  Rng rng(1);
+  EXPECT_TRUE(isMirrored(reference, 0, current, 0, {}, 0.0, rng)) << "the picture is no test";
+  EXPECT_FALSE(isMirrored(reference, 0, current, 0, {}, 1000.0, rng));
 }
 
 TEST(MirroredView, IsNoneInFrontOfSymmetricThings)

@@ -245,6 +245,26 @@ TEST_F(ViewRecognizerTest, TriesAViewAgainWhosePictureComesLater)
   EXPECT_TRUE(recognizer.update(ALL, now + std::chrono::seconds(63)).unreadable.empty()) << "it was told";
 }
 
+TEST_F(ViewRecognizerTest, ReadsAllThatAreDoubtfulAFewAtATime)
+{
+  ViewRecognizer recognizer(storedViews(store_), params());
+  recognizer.update(ALL);
+  for (const auto& entry : std::filesystem::directory_iterator(store_.directory()))
+  {
+    const std::string name = entry.path().filename().string();
+    if ((name.rfind("view4.", 0) == 0 || name.rfind("view5.", 0) == 0) && entry.path().extension() == ".png")
+    {
+      writeText(entry.path(), "damaged");
+    }
+  }
+  for (const std::uint64_t scene : { 4, 5 })
+  {
+    EXPECT_FALSE(recognizer.recognize(seen(recognizer, scene), 1, true).front().verified);
+  }
+  EXPECT_EQ(recognizer.update(1).unusable, 1U);
+  EXPECT_EQ(recognizer.update(1).unusable, 2U);
+}
+
 TEST_F(ViewRecognizerTest, KeepsItsIndexWhileTheDirectoryIsGone)
 {
   ViewRecognizer recognizer(storedViews(store_), params());
