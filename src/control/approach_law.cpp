@@ -84,7 +84,7 @@ public:
     base_ = compose(inverse(goal_in_odom_), base_in_odom_);
     if (situation.known_anew && !held_goal_ && (manoeuvre_.legs.empty() || isAnother(goal_in_odom_)))
     {
-      plan(situation);
+      plan(situation, params_.manoeuvre);
     }
     advance();
     if (compose(inverse(planned_from_), base_in_odom_).distance() > DRIVEN)
@@ -229,9 +229,9 @@ private:
     return moved && !docked();
   }
 
-  void plan(const Situation& situation)
+  void plan(const Situation& situation, const ManoeuvreParams& params)
   {
-    const Manoeuvre found = planManoeuvre(base_, situation.share, params_.manoeuvre);
+    const Manoeuvre found = planManoeuvre(base_, situation.share, params);
     if (!found.legs.empty())
     {
       begin(found);
@@ -299,13 +299,17 @@ private:
   void correct(const Situation& situation, double error)
   {
     constexpr int WITHOUT_GAIN = 3;
-    constexpr double GAIN = 0.8;    // of the error, to be one
-    constexpr double GROWTH = 1.5;  // of the tolerance
+    constexpr double GAIN = 0.8;       // of the error, to be one
+    constexpr double GROWTH = 1.5;     // of the tolerance
+    constexpr double SLOPE = 10.0;     // length of the last leg by what it has to make up for
+    constexpr double SHORTEST = 0.12;  // last leg [m]
     corrections_ = error < GAIN * least_error_ ? 0 : corrections_ + 1;
     least_error_ = std::min(least_error_, error);
     if (corrections_ < WITHOUT_GAIN)
     {
-      plan(situation);
+      ManoeuvreParams little = params_.manoeuvre;
+      little.straight_end = std::clamp(SLOPE * error, SHORTEST, params_.manoeuvre.straight_end);
+      plan(situation, little);
       held_goal_ = situation.goal_in_odom;
     }
     else if (tolerance_ < most_tolerance_)

@@ -366,7 +366,7 @@ protected:
 private:
   static constexpr std::size_t ENOUGH_SUPPORT = 40;  // matches that structure is made from
   static constexpr double CLOCKS_PERIOD = 0.5;       // between two estimates of their offset, which take a while [s]
-  static constexpr int ENOUGH_CORRECTIONS = 10;      // of the scale, each by a fifth, until it is that of metres
+  static constexpr int ENOUGH_CORRECTIONS = 10;      // of the scale, until it is that of metres
   static constexpr double IN_PLACE = 1.5;            // median displacement of the view's points at the view [px]
   static constexpr int MIN_UPDATES = 2;              // sets of matches that agree before a hypothesis is followed
 
@@ -624,16 +624,18 @@ private:
     {
       trail_.pop_front();
     }
-    const double by_odometry = compose(inverse(trail_.front().in_odom), camera_in_odom).distance();
-    const double by_view =
-        std::hypot(camera_in_view.x - trail_.front().in_view.x, camera_in_view.y - trail_.front().in_view.y);
-    if (by_odometry >= SHORTEST && by_view > 0.0)
+    const PlanarPose by_odometry = compose(inverse(trail_.front().in_odom), camera_in_odom);
+    const PlanarPose by_view = compose(inverse(trail_.front().in_view), camera_in_view);
+    if (by_odometry.distance() >= SHORTEST)
     {
-      const double measured = std::clamp(by_odometry / by_view, scale_ / MAX_CHANGE, scale_ * MAX_CHANGE);
+      // The seen way counts as far as it goes along the driven one: errors make it longer, but not that part of it.
+      const double squared = by_odometry.distance() * by_odometry.distance();
+      const double along = by_odometry.x * by_view.x + by_odometry.y * by_view.y;
+      const double measured = std::clamp(squared / std::max(along, 0.0), scale_ / MAX_CHANGE, scale_ * MAX_CHANGE);
       const double change = std::log(measured / scale_);
       const double weight = std::max(WEIGHT, 1.0 / (scale_corrections_ + 1));  // a plain mean of the first ones
       scale_variance_ += weight * (change * change - scale_variance_);
-      scale_ = std::clamp(scale_ * std::pow(measured / scale_, WEIGHT), 1.0 / MAX_SCALE, MAX_SCALE);
+      scale_ = std::clamp(scale_ * std::pow(measured / scale_, weight), 1.0 / MAX_SCALE, MAX_SCALE);
       ++scale_corrections_;
     }
   }

@@ -50,17 +50,18 @@ public:
       }
       candidate.legs.back().end.yaw = 0.0;  // whatever is left across is made up for on the way
       candidate.duration = durationOf(candidate);
+      candidate.length = lengthOf(candidate);
       candidates.push_back(std::move(candidate));
     }
     std::sort(candidates.begin(), candidates.end(),
-              [](const Manoeuvre& a, const Manoeuvre& b) { return a.duration < b.duration; });
+              [this](const Manoeuvre& a, const Manoeuvre& b) { return costOf(a) < costOf(b); });
     Manoeuvre best;
     double least = std::numeric_limits<double>::infinity();
     for (Manoeuvre& candidate : candidates)
     {
-      if (candidate.duration >= least)
+      if (costOf(candidate) >= least)
       {
-        break;
+        break;  // of those that follow each costs more, even with all of the view in sight
       }
       if (lookAlong(candidate, least))
       {
@@ -74,6 +75,7 @@ public:
 private:
   static constexpr double GRID = 0.2;                 // between places that are tried [m]
   static constexpr double SECONDS_PER_SHARE = 100.0;  // what a lack of the view in sight counts for
+  static constexpr double SECONDS_PER_METRE = 8.0;    // what a way counts for besides the time that it takes
 
   /** All that are tried: straight onto the goal's axis, or by one place on the way there. */
   std::vector<Places> ways() const
@@ -124,7 +126,7 @@ private:
     const Leg* before = nullptr;
     for (const Leg& leg : manoeuvre.legs)
     {
-      duration += STOP + std::abs(wrapAngle(leg.end.yaw - at.yaw)) / TURN_RATE + lengthOf(at, leg) / SPEED;
+      duration += STOP + std::abs(wrapAngle(leg.end.yaw - at.yaw)) / TURN_RATE + view_servo::lengthOf(at, leg) / SPEED;
       duration += before && before->backwards != leg.backwards ? REVERSAL : 0.0;
       at = leg.end;
       before = &leg;
@@ -132,9 +134,22 @@ private:
     return duration + std::abs(at.yaw) / TURN_RATE;
   }
 
+  double lengthOf(const Manoeuvre& manoeuvre) const
+  {
+    double length = 0.0;
+    PlanarPose at = base_;
+    for (const Leg& leg : manoeuvre.legs)
+    {
+      length += view_servo::lengthOf(at, leg);
+      at = leg.end;
+    }
+    return length;
+  }
+
   double costOf(const Manoeuvre& manoeuvre) const
   {
-    return manoeuvre.duration + SECONDS_PER_SHARE * std::max(0.0, params_.min_share - manoeuvre.least_share);
+    return manoeuvre.duration + SECONDS_PER_METRE * manoeuvre.length +
+           SECONDS_PER_SHARE * std::max(0.0, params_.min_share - manoeuvre.least_share);
   }
 
   /** Fills in what is in sight on the way. @return whether it costs less than `least` and is not blind for too long. */

@@ -64,12 +64,11 @@ PlaceWatch::Verdict PlaceWatch::judge(const Sight& from, const Sight& to, double
   return alike ? Verdict::ALIKE : Verdict::OTHERWISE;
 }
 
-void PlaceWatch::Doubt::add(double moved, Verdict verdict, double limit, const Sight& now)
+void PlaceWatch::Doubt::add(Verdict verdict, double stretch, double limit, const Sight& now)
 {
-  length += moved;
   if (verdict != Verdict::OPEN)
   {
-    length = verdict == Verdict::ALIKE ? 0.0 : length;
+    length = verdict == Verdict::ALIKE ? 0.0 : length + stretch;
     contradicted = length >= limit;
     from = now;
   }
@@ -126,10 +125,12 @@ bool PlaceWatch::add(const Eigen::Isometry3d& camera, const Eigen::Isometry3d& v
   }
   // Each by itself: a picture that is turned round turns about the camera's axis as the camera does, but goes the other
   // way.
-  doubtful_way_.add(step.translation().norm(), judge(doubtful_way_.from, now, limits_.doubt / 2.0, NEVER, TURNED),
+  const Eigen::Isometry3d driven = doubtful_way_.from.camera.inverse() * camera;
+  doubtful_way_.add(judge(doubtful_way_.from, now, limits_.doubt / 2.0, NEVER, TURNED), driven.translation().norm(),
                     limits_.doubt, now);
-  doubtful_turn_.add(rotationVector(step.linear()).norm(),
-                     judge(doubtful_turn_.from, now, NEVER, limits_.doubt_turn / 2.0, TURNED), limits_.doubt_turn, now);
+  const Eigen::Isometry3d turned = doubtful_turn_.from.camera.inverse() * camera;
+  doubtful_turn_.add(judge(doubtful_turn_.from, now, NEVER, limits_.doubt_turn / 2.0, TURNED),
+                     rotationVector(turned.linear()).norm(), limits_.doubt_turn, now);
   return jumped;
 }
 

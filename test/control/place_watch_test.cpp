@@ -5,6 +5,8 @@
 #include <gtest/gtest.h>
 #include <Eigen/Geometry>
 
+#include <cmath>
+
 namespace view_servo
 {
 namespace
@@ -155,6 +157,23 @@ TEST(PlaceWatch, IsContradictedByAPictureThatStaysOrGoesTheOtherWay)
     EXPECT_TRUE(turning.contradicted());
     EXPECT_FALSE(ahead.trusted());
     EXPECT_FALSE(turning.trusted());
+  }
+}
+
+TEST(PlaceWatch, IsNotContradictedByErrorsWhileTheCameraTurnsToAndFro)
+{
+  PlaceWatch watch(LIMITS);
+  const auto see = [&](double yaw, double error) {
+    watch.add(at(0.0, 0.0, yaw), (at(0.0, 0.0, yaw + error)).inverse() * at(1.0, 0.0, 0.0), 1.0);
+  };
+  for (int i = 0; i < 200; ++i)
+  {
+    see(0.03 * std::sin(0.3 * i), 0.0);  // far more than the limit in all, to and fro
+  }
+  for (double moved = 0.0; moved < 0.08; moved += 0.01)
+  {
+    see(moved, -moved);
+    EXPECT_FALSE(watch.contradicted()) << moved;
   }
 }
 

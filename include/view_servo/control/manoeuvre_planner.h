@@ -30,6 +30,7 @@ struct Manoeuvre
   double least_share = 1.0;     ///< least share of the view in sight on the way, [0, 1]
   double blind_distance = 0.0;  ///< length of the way with too little of the view in sight [m]
   double blind_turn = 0.0;      ///< angle of the turns with too little of the view in sight [rad]
+  double length = 0.0;          ///< of all legs [m]
   double duration = 0.0;        ///< estimated time, for a base that drives 0.25 m/s and turns 0.4 rad/s [s]
 };
 
@@ -52,8 +53,8 @@ std::vector<Parameter> parameters(ManoeuvreParams& params);
 using ShareInSight = std::function<double(const PlanarPose& base_in_goal)>;
 
 /**
- * The quickest of the manoeuvres that keep params.min_share of the view in sight and do not retreat too far. Where none
- * does, the best compromise between time and share whose blind part is within its bounds.
+ * The best compromise between time and length among the manoeuvres that keep params.min_share of the view in sight and
+ * do not retreat too far. Where none does, the best one of these and the share whose blind part is within its bounds.
  * @return a manoeuvre without legs when there is none.
  */
 Manoeuvre planManoeuvre(const PlanarPose& base_in_goal, const ShareInSight& share, const ManoeuvreParams& params);

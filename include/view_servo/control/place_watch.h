@@ -84,15 +84,21 @@ private:
     OTHERWISE
   };
 
-  /** The camera's way, or its turn, since the view has last been seen to move as it does. */
+  /**
+   * The camera's way, or its turn, since the view has last been seen to move as it does: the sum of those stretches over
+   * which it was seen not to. To and fro is none.
+   */
   struct Doubt
   {
     Sight from;           // of the stretch that is judged next
     double length = 0.0;  // [m] or [rad]
     bool contradicted = false;
 
-    /** @param verdict on the stretch from `from` to `now`. @param limit from which length on it is contradicted. */
-    void add(double moved, Verdict verdict, double limit, const Sight& now);
+    /**
+     * @param verdict on the stretch from `from` to `now`. @param stretch its length, straight.
+     * @param limit from which length on it is contradicted.
+     */
+    void add(Verdict verdict, double stretch, double limit, const Sight& now);
   };
 
   /** Of the view, in the frame of `camera` [m]. */
