@@ -213,8 +213,8 @@ class TriedCommands(unittest.TestCase):
             self.assert_topic(arguments[0].split(":=")[1], "sensor_msgs/Image")
             with open(os.path.join(ROOT, "scripts", "install_dependencies")) as file:
                 self.assertIn("ros-image-view", file.read())
-            if self.is_installed(package):
-                self.assertTrue(roslib.packages.find_node(package, program))
+            self.assertTrue(self.is_installed(package), "rosrun needs its package.xml")
+            self.assertTrue(roslib.packages.find_node(package, program))
             return
         if package == "nodelet":  # which test/rostest/nodelets_test.py runs
             self.assertIn("libnodeletlib-tools", self.read("scripts", "install_dependencies"))
