@@ -82,7 +82,7 @@ public:
     goal_in_odom_ = held_goal_.value_or(situation.goal_in_odom);
     base_in_odom_ = situation.base_in_odom;
     base_ = compose(inverse(goal_in_odom_), base_in_odom_);
-    if (situation.known_anew && !held_goal_ && (manoeuvre_.legs.empty() || isAnother(goal_in_odom_)))
+    if (situation.known_anew && !held_goal_ && (manoeuvre_.legs.empty() ? isTimeToTry() : isAnother(goal_in_odom_)))
     {
       plan(situation, params_.manoeuvre);
     }
@@ -229,6 +229,13 @@ private:
     return moved && !docked();
   }
 
+  /** Without a manoeuvre: at once, and then now and then, as a search that finds no way takes long. */
+  bool isTimeToTry()
+  {
+    constexpr int EVERY = 5;  // image or matches
+    return tries_++ % EVERY == 0;
+  }
+
   void plan(const Situation& situation, const ManoeuvreParams& params)
   {
     const Manoeuvre found = planManoeuvre(base_, situation.share, params);
@@ -330,6 +337,7 @@ private:
   PlanarPose planned_goal_;              // when the manoeuvre was planned, in odometry's frame
   PlanarPose planned_from_;              // where the base was then, in odometry's frame
   int plans_ = 0;                        // in a row, without driving in between
+  int tries_ = 0;                        // images or matches while there was no manoeuvre
   std::optional<PlanarPose> held_goal_;  // in odometry's frame, while the base corrects where it stood
   PlanarPose goal_in_odom_;              // by which the base drives
   PlanarPose axis_in_odom_;              // the goal when the base was last not turned away from it

@@ -59,7 +59,7 @@ public:
     double least = std::numeric_limits<double>::infinity();
     for (Manoeuvre& candidate : candidates)
     {
-      if (costOf(candidate) >= least)
+      if (costOf(candidate) >= least || looks_ > MOST_LOOKS)
       {
         break;  // of those that follow each costs more, even with all of the view in sight
       }
@@ -74,6 +74,8 @@ public:
 
 private:
   static constexpr double GRID = 0.2;                 // between places that are tried [m]
+  static constexpr double MOST_PLACES = 25.0;         // in a row; farther away they lie farther apart
+  static constexpr int MOST_LOOKS = 5000;             // each takes up to a quarter of a millisecond
   static constexpr double SECONDS_PER_SHARE = 100.0;  // what a lack of the view in sight counts for
   static constexpr double SECONDS_PER_METRE = 8.0;    // what a way counts for besides the time that it takes
 
@@ -88,13 +90,15 @@ private:
     const double ahead = std::max(base_.x, 0.0) + ROOM_AHEAD;
     const double right = std::min(base_.y, 0.0) - ROOM_ASIDE;
     const double left = std::max(base_.y, 0.0) + ROOM_ASIDE;
+    const double along = std::max(GRID, (ahead - back) / MOST_PLACES);
+    const double across = std::max(GRID, (left - right) / MOST_PLACES);
     const Eigen::Vector2d goal = Eigen::Vector2d::Zero();
     std::vector<Places> all;
     if (std::abs(base_.y) <= ON_AXIS && std::abs(base_.yaw) <= ALONG_AXIS && std::abs(base_.x) >= params_.straight_end)
     {
       all.push_back({ goal });
     }
-    for (double end = params_.straight_end; end <= std::max(-back, ahead); end += GRID)
+    for (double end = params_.straight_end; end <= std::max(-back, ahead); end += along)
     {
       for (const Eigen::Vector2d& last : { Eigen::Vector2d(-end, 0.0), Eigen::Vector2d(end, 0.0) })
       {
@@ -103,9 +107,9 @@ private:
           continue;
         }
         all.push_back({ last, goal });
-        for (double x = back; x <= ahead; x += GRID)
+        for (double x = back; x <= ahead; x += along)
         {
-          for (double y = right; y <= left; y += GRID)
+          for (double y = right; y <= left; y += across)
           {
             all.push_back({ Eigen::Vector2d(x, y), last, goal });
           }
@@ -153,7 +157,7 @@ private:
   }
 
   /** Fills in what is in sight on the way. @return whether it costs less than `least` and is not blind for too long. */
-  bool lookAlong(Manoeuvre& manoeuvre, double least) const
+  bool lookAlong(Manoeuvre& manoeuvre, double least)
   {
     PlanarPose at = base_;
     for (const Leg& leg : manoeuvre.legs)
@@ -169,7 +173,7 @@ private:
   }
 
   /** The same of a turn or a straight way. */
-  bool lookAlong(const PlanarPose& from, const PlanarPose& to, double least, Manoeuvre& manoeuvre) const
+  bool lookAlong(const PlanarPose& from, const PlanarPose& to, double least, Manoeuvre& manoeuvre)
   {
     constexpr double TURN_STEP = 0.15;  // between two looks [rad]
     constexpr double STEP = 0.25;       // [m]
@@ -179,6 +183,7 @@ private:
     for (int i = 1; i <= steps; ++i)
     {
       const double part = static_cast<double>(i) / steps;
+      ++looks_;
       const double share = share_(
           { from.x + part * (to.x - from.x), from.y + part * (to.y - from.y), wrapAngle(from.yaw + part * turn) });
       manoeuvre.least_share = std::min(manoeuvre.least_share, share);
@@ -199,6 +204,7 @@ private:
   const PlanarPose base_;
   const ShareInSight& share_;
   const ManoeuvreParams& params_;
+  int looks_ = 0;  // at what is in sight
 };
 
 }  // namespace

@@ -84,6 +84,27 @@ RC_GTEST_PROP(ManoeuvrePlanner, KeepsTheViewInSightWhereThatCanBe, ())
   RC_ASSERT(manoeuvre.blind_distance == 0.0);
 }
 
+TEST(ManoeuvrePlanner, EndsSoonHoweverFarAwayTheGoalIs)
+{
+  for (const PlanarPose& start :
+       { PlanarPose{ -4.0, 1.0, 0.3 }, PlanarPose{ -20.0, 10.0, 0.4 }, PlanarPose{ -500.0, 300.0, 0.2 } })
+  {
+    for (const double seen : { 0.0, 0.2, 1.0 })
+    {
+      int looks = 0;
+      const Manoeuvre manoeuvre = planManoeuvre(
+          start,
+          [&](const PlanarPose&) {
+            ++looks;
+            return seen;
+          },
+          ManoeuvreParams());
+      EXPECT_LT(looks, 10000) << start.x;
+      EXPECT_EQ(manoeuvre.legs.empty(), seen < 0.15) << start.x << ", " << seen;
+    }
+  }
+}
+
 TEST(ManoeuvrePlanner, DrivesStraightAheadFromBehind)
 {
   const Manoeuvre manoeuvre = planManoeuvre({ -1.0, 0.0, 0.0 }, ofAWall, ManoeuvreParams());

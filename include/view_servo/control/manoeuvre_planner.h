@@ -55,6 +55,7 @@ using ShareInSight = std::function<double(const PlanarPose& base_in_goal)>;
 /**
  * The best compromise between time and length among the manoeuvres that keep params.min_share of the view in sight and
  * do not retreat too far. Where none does, the best one of these and the share whose blind part is within its bounds.
+ * It ends after some thousand calls of `share`, with the best one found by then.
  * @return a manoeuvre without legs when there is none.
  */
 Manoeuvre planManoeuvre(const PlanarPose& base_in_goal, const ShareInSight& share, const ManoeuvreParams& params);
