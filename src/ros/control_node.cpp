@@ -28,6 +28,17 @@ void requestShutdown(int /*signal*/)
   g_shutdown_requested = true;
 }
 
+/** Of a terminal that is closed, unless the program is to outlive that, as by nohup. @return the handler of before. */
+void (*catchHangUp())(int)
+{
+  void (*const before)(int) = std::signal(SIGHUP, requestShutdown);
+  if (before == SIG_IGN)
+  {
+    std::signal(SIGHUP, SIG_IGN);
+  }
+  return before;
+}
+
 /** The master's call, as `rosnode kill` makes it. */
 void shutdownCallback(XmlRpc::XmlRpcValue& /*parameters*/, XmlRpc::XmlRpcValue& result)
 {
@@ -51,6 +62,7 @@ public:
     {
       before_.interrupt = std::signal(SIGINT, requestShutdown);
       before_.terminate = std::signal(SIGTERM, requestShutdown);
+      before_.hang_up = catchHangUp();
       detail::deferShutdown();
       over_ = false;
       thread_ = std::thread([this] { watch(); });
@@ -71,6 +83,7 @@ public:
       thread_.join();
       std::signal(SIGINT, before_.interrupt);
       std::signal(SIGTERM, before_.terminate);
+      std::signal(SIGHUP, before_.hang_up);
       g_is_deferred = false;
       if (g_shutdown_requested)
       {
@@ -110,6 +123,7 @@ private:
   {
     void (*interrupt)(int) = SIG_DFL;
     void (*terminate)(int) = SIG_DFL;
+    void (*hang_up)(int) = SIG_DFL;
   } before_;  // handlers of the signals
   std::thread thread_;
 };
@@ -197,6 +211,7 @@ void detail::deferShutdown()
   g_is_deferred = true;
   std::signal(SIGINT, requestShutdown);
   std::signal(SIGTERM, requestShutdown);
+  catchHangUp();
   ros::XMLRPCManager::instance()->unbind("shutdown");
   ros::XMLRPCManager::instance()->bind("shutdown", shutdownCallback);
 }

@@ -133,6 +133,12 @@ class Nodelets(graph.GraphTest):
         manager = self.assert_zero_is_sent(lambda: os.kill(self.graph.pid_of("/" + MANAGER), signal.SIGTERM))
         self.assertEqual(manager.wait(PATIENCE), 0, self.graph.log())
 
+    def test_zero_is_sent_when_the_managers_terminal_is_closed(self):
+        before = signal.signal(signal.SIGHUP, signal.SIG_DFL)  # what is started inherits that it is ignored, as by nohup
+        self.addCleanup(signal.signal, signal.SIGHUP, before)
+        manager = self.assert_zero_is_sent(lambda: os.kill(self.graph.pid_of("/" + MANAGER), signal.SIGHUP))
+        self.assertEqual(manager.wait(PATIENCE), 0, self.graph.log())
+
     def test_zero_is_sent_when_the_manager_is_ended_by_rosnode_kill(self):
         manager = self.assert_zero_is_sent(lambda: self.graph.run("rosnode kill /" + MANAGER))
         self.assertEqual(manager.wait(PATIENCE), 0, self.graph.log())

@@ -113,8 +113,8 @@ private:
 namespace detail
 {
 /**
- * From now on SIGINT, SIGTERM and the master's order to shut down only make shutdownRequested() true, so that a node
- * can stop its robot before ROS ends.
+ * From now on SIGINT, SIGTERM, SIGHUP (a terminal was closed; unless it is ignored, as by nohup) and the master's order
+ * to shut down only make shutdownRequested() true, so that a node can stop its robot before ROS ends.
  */
 void deferShutdown();
 /** Whether one of these has come since deferShutdown(). */
@@ -129,7 +129,7 @@ constexpr std::uint32_t CONTROL_NODE_THREADS = 4;
 
 /**
  * Has a robot stopped before ROS shuts down in a process that belongs to somebody else. From the first one to the end
- * of the last, SIGINT, SIGTERM and the master's order to shut down first have `stop` called of all of them, and then
+ * of the last, SIGINT, SIGTERM, SIGHUP and the master's order to shut down first have `stop` called of all of them, and then
  * shut ROS down.
  */
 class StopBeforeShutdown
