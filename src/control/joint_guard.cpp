@@ -82,7 +82,7 @@ std::string JointGuard::add(double time, const std::vector<std::string>& names, 
     }
     const auto before = joints_.find(names[i]);
     Joint joint{ time, positions[i], 0.0, before == joints_.end() ? positions[i] : before->second.first };
-    if (velocities.size() == positions.size())
+    if (velocities.size() == positions.size() && std::isfinite(velocities[i]))  // NaN: it is not known (REP 117)
     {
       joint.velocity = velocities[i];
     }

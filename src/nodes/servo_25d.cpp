@@ -220,6 +220,7 @@ public:
     setGains(*task_);  // they may have been changed since it was prepared
     task_->start = Clock::now();
     homographies_.setNeeded(true);
+    homographies_.forgetStamps();
     camera_frame_ = withoutSlash(info_->header.frame_id);
     joints_.begin(jointsMoving(description_, camera_frame_));
     joint_states_.setNeeded(false);  // until one of those has been heard of

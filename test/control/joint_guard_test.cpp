@@ -70,6 +70,14 @@ TEST_F(JointGuardTest, IsNotConfusedByNonsense)
   EXPECT_EQ(guard_.problem(1.0), "");
 }
 
+TEST_F(JointGuardTest, ComputesAVelocityThatIsNotKnown)
+{
+  constexpr double UNKNOWN = std::numeric_limits<double>::quiet_NaN();
+  guard_.add(0.1, { "elbow" }, { 1.995 }, { UNKNOWN });
+  guard_.add(0.2, { "elbow" }, { 1.985 }, { UNKNOWN });
+  EXPECT_EQ(guard_.problem(0.2), "") << "it comes away from the limit";
+}
+
 TEST_F(JointGuardTest, DoesNotBelieveAPositionFarBeyondTheLimits)
 {
   EXPECT_EQ(guard_.add(0.0, { "elbow" }, { 2.2 }, { 0.0 }), "");  // an encoder may be off by that

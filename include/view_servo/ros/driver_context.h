@@ -78,6 +78,11 @@ public:
   {
     return order_.newest();
   }
+  /** Forgets which stamps have come: while nobody looked at them, time may have gone back. */
+  void forgetStamps()
+  {
+    order_ = StampOrder();
+  }
   /** To be called when a goal begins: the time without input counts from now. */
   void restart()
   {
