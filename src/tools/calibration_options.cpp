@@ -112,11 +112,11 @@ bool readCalibrationOptions(CommandLine& line, int argc, char** argv, const Cali
   {
     throw std::runtime_error("--out: name the file to write");
   }
+  refuseToReplace(options.out, "--out", options.overwrite);
+  refuseToReplace(options.keep, "--keep", options.overwrite);
   refuseSameFile(options.keep, "--keep", options.out, "--out");
   refuseSameFile(options.keep, "--keep", options.file, "--file");
   refuseSameFile(options.out, "--out", options.file, "--file");
-  refuseToReplace(options.out, "--out", options.overwrite);
-  refuseToReplace(options.keep, "--keep", options.overwrite);
   requireWritable(options.out, "--out");
   requireWritable(options.keep, "--keep");
   return true;
